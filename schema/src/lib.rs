@@ -1,0 +1,65 @@
+//! The words of Axle: what services say to each other, and how it is written.
+//!
+//! Nothing here talks to a network, reads a clock or starts a thread; every algorithm of Axle is built on this crate
+//! alone. SI units everywhere; x forward, y left, headings counter-clockwise from +x; left comes before right.
+//!
+//! # The map of conversions
+//!
+//! Everything turns into poses, and can therefore be drawn (paper, Figure 1):
+//!
+//! ```text
+//!  Geometry ──normalized_dwm──> Dwm ──encoders_span──> EncodersSpan <──spread── EncodersData
+//!     │                          │                        │  │   └──accumulate──> EncodersData
+//!     │                          │ <──────to_dwm──────────┘  │
+//!     └──navigator_span──┐       └──navigator_span──┐        └──navigator_span──┐
+//!                        └──────────────────────────┴──> NavigatorSpan <──spread── NavigatorData
+//!                                                              └─────accumulate──> NavigatorData
+//!  halves: Dwm <──> Sides<DwmHalf>, EncodersData ──> Sides<EncodersHalf>
+//! ```
+//!
+//! # Where to find what
+//!
+//! Words: [`unit`], [`sides`], [`dwm`], [`geometry`], [`way`], [`encoders`], [`navigator`], [`sensor`], and for the
+//! services [`plan`], [`task`], [`command`], [`window`], [`presence`]. How they are written: [`codec`], [`refusal`],
+//! [`meta`], [`key`]. What a service is: [`contract`]. Formulas: [`motion`], [`series`].
+
+pub mod codec;
+pub mod command;
+pub mod contract;
+pub mod dwm;
+pub mod encoders;
+pub mod geometry;
+pub mod id;
+pub mod key;
+pub mod meta;
+pub mod motion;
+pub mod navigator;
+pub mod plan;
+pub mod presence;
+pub mod refusal;
+pub mod sensor;
+pub mod series;
+pub mod sides;
+pub mod task;
+pub mod unit;
+pub mod way;
+pub mod window;
+
+pub use codec::{Message, decode, encode};
+pub use dwm::{Dwm, DwmHalf, Track};
+pub use encoders::{EncodersData, EncodersHalf, EncodersSpan};
+pub use geometry::Geometry;
+pub use id::{Boot, RobotId, StopId, TaskId, Tick};
+pub use navigator::{NavigatorData, NavigatorSpan, Pose, Twist};
+pub use plan::{Drive, DriveAsk, Leg, Plan, PlanAsk};
+pub use refusal::Refusal;
+pub use sensor::{Fix, HeadingFix, InertialData, Signals};
+pub use sides::Sides;
+pub use task::Task;
+pub use unit::{
+    Duty, Metres, MetresPerSecond, MetresPerSecondSquared, Numbers, Radians, RadiansPerSecond, Seconds,
+};
+pub use way::{WayPoint, WayTask};
+
+/// The CDDL text of every message (RFC 8610), as shipped in `schema/axle.cddl`.
+pub const CDDL: &str = include_str!("../axle.cddl");

@@ -1,0 +1,1 @@
+//! Correctors: the services that keep a robot on its plan.

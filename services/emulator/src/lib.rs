@@ -1,0 +1,1 @@
+//! Emulator: a robot in software.

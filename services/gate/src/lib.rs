@@ -1,0 +1,1 @@
+//! Gate: the one door to the wheels.

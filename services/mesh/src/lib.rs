@@ -1,0 +1,1 @@
+//! The wires of Axle: puts services on Zenoh.

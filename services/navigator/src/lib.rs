@@ -1,0 +1,1 @@
+//! Navigator: where the robot is.

@@ -1,0 +1,1 @@
+//! Pathdriver: geometries to movements.

@@ -1,0 +1,1 @@
+//! Pathfinder: way points to geometries.

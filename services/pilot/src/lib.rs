@@ -1,0 +1,1 @@
+//! Pilot: takes a task and sees it through.

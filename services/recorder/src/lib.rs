@@ -1,0 +1,1 @@
+//! Recorder: MCAP out of everything that is said.

@@ -1,0 +1,1 @@
+//! Source: bounded buffers of measurements.
