@@ -9,16 +9,19 @@ use crate::{Dwm, EncodersData, InertialData, Metres, NavigatorData, Refusal, Sec
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// Parameters of an algorithm: one TOML file per service, every field with unit and range, unknown fields refused.
-pub trait Params: Clone + Default + Serialize + DeserializeOwned + Send + Sync + 'static {
-    /// The file with all defaults and their explanations, as it is shipped.
-    const FILE: &'static str;
-
+/// Values that have ranges.
+pub trait Bounds {
     /// Refuses values outside their ranges.
     ///
     /// # Errors
     /// Names the field, its value and its range.
     fn check(&self) -> Result<(), Refusal>;
+}
+
+/// Parameters of an algorithm: one TOML file per service, every field with unit and range, unknown fields refused.
+pub trait Params: Bounds + Clone + Default + Serialize + DeserializeOwned + Send + Sync + 'static {
+    /// The file with all defaults and their explanations, as it is shipped in `deploy/params`.
+    const FILE: &'static str;
 }
 
 /// A functional service: a model of a single function (paper, section II).

@@ -26,6 +26,7 @@
 pub mod codec;
 pub mod command;
 pub mod contract;
+pub mod drivetrain;
 pub mod dwm;
 pub mod encoders;
 pub mod geometry;
@@ -46,6 +47,7 @@ pub mod way;
 pub mod window;
 
 pub use codec::{Message, decode, encode};
+pub use drivetrain::Drivetrain;
 pub use dwm::{Dwm, DwmHalf, Track};
 pub use encoders::{EncodersData, EncodersHalf, EncodersSpan};
 pub use geometry::Geometry;

@@ -1,6 +1,8 @@
 //! What the functional services are asked and answer: from way points to geometries to movements.
 
 use crate::codec::Message;
+use crate::contract::Bounds as _;
+use crate::drivetrain::Drivetrain;
 use crate::refusal::within;
 use crate::way::MAX_POINTS;
 use crate::{Dwm, Geometry, Metres, MetresPerSecond, Pose, Refusal, Seconds, Sides, WayTask};
@@ -57,6 +59,9 @@ pub struct DriveAsk {
     /// Wheel speeds at the beginning; left out, the robot stands.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub speeds: Option<Sides<MetresPerSecond>>,
+    /// The robot that will drive; left out, the one of Pathdriver's own parameters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub robot: Option<Drivetrain>,
 }
 
 /// Pathdriver's answer: the movements to make, one after the other.
@@ -111,6 +116,7 @@ impl Message for DriveAsk {
     const NAME: &'static str = "DriveAsk";
     const LIMIT: usize = 1024 * 1024;
     fn check(&self) -> Result<(), Refusal> {
+        self.robot.map_or(Ok(()), |robot| robot.check())?;
         check_legs(&self.legs)
     }
 }
