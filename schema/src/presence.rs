@@ -2,6 +2,7 @@
 
 use crate::codec::Message;
 use crate::id::Boot;
+use crate::plan::limit_list;
 use crate::{Refusal, Seconds};
 use serde::{Deserialize, Serialize};
 
@@ -34,17 +35,27 @@ pub struct Status {
     pub received: u64,
     /// Messages and queries that were refused or could not be read.
     pub refused: u64,
+    /// The keys it publishes or answers.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub says: Vec<String>,
+    /// The keys it listens to.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub hears: Vec<String>,
 }
+
+/// The most keys of either kind that a status lists.
+pub const MAX_KEYS: usize = 64;
 impl Message for Status {
     const NAME: &'static str = "Status";
-    const LIMIT: usize = 1024;
+    const LIMIT: usize = 16 * 1024;
     fn check(&self) -> Result<(), Refusal> {
         for (what, text) in
             [("service", &self.service), ("robot", &self.robot), ("host", &self.host), ("version", &self.version)]
         {
-            crate::plan::limit_list(&format!("letters of {what}"), text.len(), 128)?;
+            limit_list(&format!("letters of {what}"), text.len(), 128)?;
         }
-        Ok(())
+        limit_list("keys that a process says", self.says.len(), MAX_KEYS)?;
+        limit_list("keys that a process hears", self.hears.len(), MAX_KEYS)
     }
 }
 

@@ -83,6 +83,7 @@ pub enum Refusal {
         /// Who was asked.
         what: String,
         /// How long the asker waited.
+        #[serde(serialize_with = "crate::unit::finite", deserialize_with = "crate::unit::deserialize_finite")]
         seconds: f64,
     },
     /// Somebody else has it.
@@ -115,6 +116,10 @@ pub enum Refusal {
         /// What happened.
         why: String,
     },
+}
+
+impl crate::Message for Refusal {
+    const NAME: &'static str = "Refusal";
 }
 
 impl Refusal {

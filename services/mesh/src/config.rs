@@ -1,0 +1,63 @@
+//! The Zenoh configuration of every process of Axle: client mode, static endpoints, short leases.
+//!
+//! Clients of one router lose nothing at start-up and are always relayed; peers are neither. Multicast and gossip are
+//! off, since they find what was not meant. The lease is short, so that a frozen process is known within a second; it
+//! serves presence only, never the safety of motion. Client and router must agree on the link settings: both come
+//! from [`LINK`].
+
+use crate::Fault;
+use zenoh::Config;
+
+/// Link settings that clients and routers share, as JSON5 values by their configuration key.
+///
+/// The receiver of a lease is the other side, hence the same on both. `max_message_size` is above the largest message
+/// of Axle, so that an oversized one arrives and is refused by name, and below what would hurt.
+pub const LINK: &[(&str, &str)] = &[
+    ("scouting/multicast/enabled", "false"),
+    ("scouting/gossip/enabled", "false"),
+    ("transport/link/tx/lease", "1000"),
+    ("transport/link/tx/keep_alive", "4"),
+    ("transport/link/tx/queue/congestion_control/block/wait_before_close", "500000"),
+    ("transport/link/rx/max_message_size", "16777216"),
+    ("transport/unicast/open_timeout", "1000"),
+    ("transport/unicast/accept_timeout", "1000"),
+];
+
+/// The configuration of a client of the routers at `endpoints`; `patience_ms` of -1 waits for ever.
+///
+/// # Errors
+/// Names an endpoint that is not of the form `tcp/host:port`.
+pub(crate) fn client(endpoints: &[String], patience_ms: i64) -> Result<Config, Fault> {
+    let mut config = Config::default();
+    let endpoints_json = serde_json::to_string(endpoints).map_err(|_| Fault::Endpoint(endpoints.join(" ")))?;
+    let set = |config: &mut Config, key: &str, value: &str| {
+        config.insert_json5(key, value).map_err(|source| Fault::Config { key: key.to_owned(), source })
+    };
+    set(&mut config, "mode", "\"client\"")?;
+    for endpoint in endpoints {
+        check_endpoint(endpoint)?;
+    }
+    config
+        .insert_json5("connect/endpoints", &endpoints_json)
+        .map_err(|_| Fault::Endpoint(endpoints.join(" ")))?;
+    set(&mut config, "connect/timeout_ms", &patience_ms.to_string())?;
+    set(&mut config, "connect/retry", "{ period_init_ms: 50, period_max_ms: 500, period_increase_factor: 2 }")?;
+    set(&mut config, "listen/endpoints", "[]")?;
+    set(&mut config, "queries_default_timeout", "5000")?;
+    for (key, value) in LINK {
+        set(&mut config, key, value)?;
+    }
+    Ok(config)
+}
+
+/// Refuses what is not `tcp/host:port`.
+///
+/// # Errors
+/// [`Fault::Endpoint`] with the text.
+pub fn check_endpoint(endpoint: &str) -> Result<(), Fault> {
+    let wrong = || Fault::Endpoint(endpoint.to_owned());
+    let address = endpoint.strip_prefix("tcp/").ok_or_else(wrong)?;
+    let (host, port) = address.rsplit_once(':').ok_or_else(wrong)?;
+    let port_is_right = port.parse::<u16>().is_ok_and(|port| port > 0);
+    if host.is_empty() || !port_is_right { Err(wrong()) } else { Ok(()) }
+}

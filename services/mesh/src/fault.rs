@@ -1,0 +1,46 @@
+//! What can go wrong between a process and the mesh.
+
+/// An operation on Zenoh that failed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Fault {
+    /// An endpoint that nobody can connect to.
+    #[error("{0:?} is not an endpoint; write tcp/HOST:PORT, for example tcp/127.0.0.1:7447")]
+    Endpoint(String),
+    /// A configuration value that Zenoh refuses.
+    #[error("configure Zenoh: {key}")]
+    Config {
+        /// The configuration key.
+        key: String,
+        /// What Zenoh says.
+        source: zenoh::Error,
+    },
+    /// The router did not answer in time.
+    #[error(
+        "no router answers at {endpoints}; start one with `axle router` or everything with `axle up`, or name another \
+         one with --connect"
+    )]
+    NoRouter {
+        /// The endpoints that were tried.
+        endpoints: String,
+    },
+    /// A declaration failed.
+    #[error("declare {key}")]
+    Declare {
+        /// The key.
+        key: String,
+        /// What Zenoh says.
+        source: zenoh::Error,
+    },
+    /// A query could not be sent.
+    #[error("ask {key}")]
+    Ask {
+        /// The key.
+        key: String,
+        /// What Zenoh says.
+        source: zenoh::Error,
+    },
+    /// A key expression that Zenoh does not accept.
+    #[error("{0:?} is not a key expression: no leading or trailing slash, no empty chunk; for example axle/r1/**")]
+    KeyExpression(String),
+}

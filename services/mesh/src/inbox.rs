@@ -1,0 +1,274 @@
+//! Hearing what is said on a key.
+//!
+//! Zenoh calls back from the task that reads the link: whoever lingers there stalls every stream of the process, and
+//! a stall longer than the lease ends the session. So the callback only stores, in a queue that forgets the oldest
+//! when it is full; decoding happens in the beat of the service.
+
+use crate::{Counters, Fault, Mesh};
+use axle_schema::codec::{Message, decode, decode_as};
+use axle_schema::key::Key;
+use axle_schema::meta::Meta;
+use axle_schema::Refusal;
+use std::collections::VecDeque;
+use std::marker::PhantomData;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+use tokio::sync::Notify;
+use zenoh::Wait as _;
+use zenoh::sample::Sample;
+
+/// A sample as it came, not decoded yet.
+#[derive(Clone, Debug)]
+pub struct Raw {
+    /// The concrete key.
+    pub key: String,
+    /// The encoding, for example `application/cbor;axle.Dwm.v1`.
+    pub encoding: String,
+    /// The payload.
+    pub payload: Vec<u8>,
+    /// The attachment, empty if there was none.
+    pub attachment: Vec<u8>,
+    /// Whether the sample deletes the key.
+    pub deletes: bool,
+    /// When it came, as wall time in seconds since 1970.
+    pub received: f64,
+}
+
+impl Raw {
+    /// The sequence, source and cause of the sample, if its attachment has them.
+    #[must_use]
+    pub fn meta(&self) -> Option<Meta> {
+        decode(&self.attachment).ok()
+    }
+}
+
+/// The most bytes of payload that wait in one queue, whatever its capacity in samples.
+const MAX_WAITING: usize = 32 * 1024 * 1024;
+
+/// A queue between a callback and a beat, bounded in samples and in bytes.
+struct Cell {
+    queue: Mutex<Queue>,
+    capacity: usize,
+    arrived: Notify,
+    dropped: AtomicU64,
+}
+
+#[derive(Default)]
+struct Queue {
+    samples: VecDeque<Sample>,
+    bytes: usize,
+}
+
+impl Queue {
+    fn pop(&mut self) -> Option<Sample> {
+        let sample = self.samples.pop_front()?;
+        self.bytes -= sample.payload().len();
+        Some(sample)
+    }
+}
+
+impl Cell {
+    fn new(capacity: usize) -> Arc<Self> {
+        Arc::new(Self { queue: Mutex::default(), capacity, arrived: Notify::new(), dropped: AtomicU64::new(0) })
+    }
+    fn store(&self, sample: Sample) {
+        let size = sample.payload().len();
+        let mut queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
+        while queue.samples.len() >= self.capacity || queue.bytes + size > MAX_WAITING {
+            self.dropped.fetch_add(1, Relaxed);
+            if queue.pop().is_none() {
+                return;
+            }
+        }
+        queue.bytes += size;
+        queue.samples.push_back(sample);
+        drop(queue);
+        self.arrived.notify_one();
+    }
+    fn oldest(&self) -> Option<Sample> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner).pop()
+    }
+    fn newest(&self) -> Option<Sample> {
+        let mut queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
+        let newest = queue.samples.pop_back();
+        queue.samples.clear();
+        queue.bytes = 0;
+        newest
+    }
+    async fn next(&self) -> Sample {
+        loop {
+            if let Some(sample) = self.oldest() {
+                return sample;
+            }
+            self.arrived.notified().await;
+        }
+    }
+}
+
+/// What was heard: a message, and what its attachment says of it.
+#[derive(Clone, Debug)]
+pub struct Heard<M> {
+    /// The message.
+    pub message: M,
+    /// Sequence, source and cause; plain clients leave them out.
+    pub meta: Option<Meta>,
+}
+
+/// Samples of one key, waiting to be taken.
+pub struct Inbox<M> {
+    cell: Arc<Cell>,
+    counters: Arc<Counters>,
+    complaints: Complaints,
+    // Dropping the subscriber undeclares it.
+    _subscriber: zenoh::pubsub::Subscriber<()>,
+    carries: PhantomData<fn() -> M>,
+}
+
+/// Raw samples of a key expression, waiting to be taken: for taps and recorders.
+pub struct Tap {
+    cell: Arc<Cell>,
+    counters: Arc<Counters>,
+    _subscriber: zenoh::pubsub::Subscriber<()>,
+}
+
+impl Mesh {
+    /// Hears a key; at most `capacity` samples wait, the oldest is forgotten for a new one.
+    ///
+    /// # Errors
+    /// [`Fault::Declare`].
+    pub fn inbox<M: Message>(&self, key: &Key<M>, capacity: usize) -> Result<Inbox<M>, Fault> {
+        let cell = Cell::new(capacity);
+        let (store, counters) = (Arc::clone(&cell), Arc::clone(&self.counters));
+        let subscriber = self
+            .session
+            .declare_subscriber(key.as_str().to_owned())
+            .callback(move |sample| {
+                // An oversized payload is not even stored: it costs no memory and no decoding.
+                if sample.payload().len() > M::LIMIT {
+                    counters.refused.fetch_add(1, Relaxed);
+                } else {
+                    store.store(sample);
+                }
+            })
+            .wait()
+            .map_err(|source| Fault::Declare { key: key.to_string(), source })?;
+        self.counters.note_hears(key.as_str());
+        Ok(Inbox {
+            cell,
+            counters: Arc::clone(&self.counters),
+            complaints: Complaints::new(key.to_string()),
+            _subscriber: subscriber,
+            carries: PhantomData,
+        })
+    }
+
+    /// Hears everything that a key expression matches, undecoded; read-only, bounded, never slows a sender.
+    ///
+    /// # Errors
+    /// [`Fault::KeyExpression`] and [`Fault::Declare`].
+    pub fn tap(&self, expression: &str, capacity: usize) -> Result<Tap, Fault> {
+        let expression = zenoh::key_expr::KeyExpr::autocanonize(expression.to_owned())
+            .map_err(|_| Fault::KeyExpression(expression.to_owned()))?;
+        let cell = Cell::new(capacity);
+        let store = Arc::clone(&cell);
+        let key = expression.to_string();
+        let subscriber = self
+            .session
+            .declare_subscriber(expression)
+            .callback(move |sample| store.store(sample))
+            .wait()
+            .map_err(|source| Fault::Declare { key, source })?;
+        Ok(Tap { cell, counters: Arc::clone(&self.counters), _subscriber: subscriber })
+    }
+}
+
+impl<M: Message> Inbox<M> {
+    /// The newest message that waits, if any; older ones are forgotten.
+    pub fn latest(&self) -> Option<Heard<M>> {
+        self.read(&self.cell.newest()?)
+    }
+    /// The oldest message that waits, if any.
+    pub fn take(&self) -> Option<Heard<M>> {
+        loop {
+            let sample = self.cell.oldest()?;
+            if let Some(heard) = self.read(&sample) {
+                return Some(heard);
+            }
+        }
+    }
+    /// The oldest message, as soon as there is one.
+    pub async fn next(&self) -> Heard<M> {
+        loop {
+            let sample = self.cell.next().await;
+            if let Some(heard) = self.read(&sample) {
+                return heard;
+            }
+        }
+    }
+    /// The bytes of the oldest sample, for a reader that counts faults itself.
+    pub fn take_bytes(&self) -> Option<Vec<u8>> {
+        let sample = self.cell.oldest()?;
+        self.counters.received.fetch_add(1, Relaxed);
+        Some(sample.payload().to_bytes().into_owned())
+    }
+    /// Samples that were forgotten because nobody took them in time.
+    pub fn dropped(&self) -> u64 {
+        self.cell.dropped.load(Relaxed)
+    }
+
+    fn read(&self, sample: &Sample) -> Option<Heard<M>> {
+        self.counters.received.fetch_add(1, Relaxed);
+        match decode_as(&sample.encoding().to_string(), &sample.payload().to_bytes()) {
+            Ok(message) => {
+                let meta = sample.attachment().and_then(|bytes| decode(&bytes.to_bytes()).ok());
+                Some(Heard { message, meta })
+            }
+            Err(refusal) => {
+                self.counters.refused.fetch_add(1, Relaxed);
+                self.complaints.say(&refusal);
+                None
+            }
+        }
+    }
+}
+
+impl Tap {
+    /// The oldest sample, as soon as there is one.
+    pub async fn next(&self) -> Raw {
+        let sample = self.cell.next().await;
+        self.counters.received.fetch_add(1, Relaxed);
+        Raw {
+            key: sample.key_expr().as_str().to_owned(),
+            encoding: sample.encoding().to_string(),
+            payload: sample.payload().to_bytes().into_owned(),
+            attachment: sample.attachment().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default(),
+            deletes: sample.kind() == zenoh::sample::SampleKind::Delete,
+            received: crate::clock::wall(),
+        }
+    }
+    /// Samples that were forgotten because nobody took them in time.
+    pub fn dropped(&self) -> u64 {
+        self.cell.dropped.load(Relaxed)
+    }
+}
+
+/// Logs refusals of one key at most once a second: a flood of bad messages must not become a flood of logs.
+struct Complaints {
+    key: String,
+    last: Mutex<(Option<Instant>, u64)>,
+}
+
+impl Complaints {
+    const fn new(key: String) -> Self {
+        Self { key, last: Mutex::new((None, 0)) }
+    }
+    fn say(&self, refusal: &Refusal) {
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        last.1 += 1;
+        if last.0.is_none_or(|at| at.elapsed() >= Duration::from_secs(1)) {
+            tracing::warn!(key = %self.key, refused = last.1, "{refusal}");
+            *last = (Some(Instant::now()), 0);
+        }
+    }
+}

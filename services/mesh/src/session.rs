@@ -1,0 +1,129 @@
+//! Joining and leaving the mesh.
+
+use crate::clock::Clock;
+use crate::counters::Counters;
+use crate::{Fault, config};
+use axle_schema::Boot;
+use axle_schema::key::Presence;
+use std::sync::Arc;
+use std::time::Duration;
+use zenoh::{Session, Wait as _};
+
+/// Who joins, and where.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// The routers to connect to, for example `tcp/127.0.0.1:7447`; the first that answers is used.
+    pub connect: Vec<String>,
+    /// The name of this computer.
+    pub host: String,
+    /// The catalogue name of the service; tools use their command's name.
+    pub service: String,
+    /// The robot it serves, or `all`.
+    pub robot: String,
+}
+
+/// How long to wait for a router.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Patience {
+    /// Services wait for their router, whatever the order in which things are started.
+    Forever,
+    /// People at a terminal are told soon.
+    AtMost(Duration),
+}
+
+/// A process on the mesh. Cloning shares it.
+#[derive(Clone)]
+pub struct Mesh {
+    pub(crate) session: Session,
+    pub(crate) presence: Arc<Presence>,
+    pub(crate) counters: Arc<Counters>,
+    pub(crate) version: &'static str,
+    clock: Clock,
+}
+
+impl Mesh {
+    /// Joins the mesh. While the router is absent, `waiting` is called once a second with the time waited so far.
+    ///
+    /// # Errors
+    /// [`Fault::Endpoint`] for an endpoint of a wrong form, [`Fault::NoRouter`] when patience ran out.
+    pub async fn join(
+        settings: Settings,
+        patience: Patience,
+        mut waiting: impl FnMut(Duration),
+    ) -> Result<Self, Fault> {
+        let timeout_ms = match patience {
+            Patience::Forever => -1,
+            Patience::AtMost(time) => i64::try_from(time.as_millis()).unwrap_or(i64::MAX),
+        };
+        let config = config::client(&settings.connect, timeout_ms)?;
+        let no_router = || Fault::NoRouter { endpoints: settings.connect.join(", ") };
+        // Opening blocks its thread until the router answers: it gets a thread that may block.
+        let mut opening = tokio::task::spawn_blocking(move || zenoh::open(config).wait());
+        let started = Clock::start();
+        let session = loop {
+            match tokio::time::timeout(Duration::from_secs(1), &mut opening).await {
+                Ok(Ok(Ok(session))) => break session,
+                Ok(_) => return Err(no_router()),
+                Err(_) => waiting(started.elapsed()),
+            }
+        };
+        let presence = Presence {
+            robot: settings.robot,
+            service: settings.service,
+            host: settings.host,
+            pid: std::process::id(),
+            boot: Boot::from_random(random_bits()),
+        };
+        Ok(Self {
+            session,
+            presence: Arc::new(presence),
+            counters: Arc::new(Counters::new()),
+            version: env!("CARGO_PKG_VERSION"),
+            clock: Clock::start(),
+        })
+    }
+
+    /// This run of the process.
+    #[must_use]
+    pub fn boot(&self) -> Boot {
+        self.presence.boot
+    }
+    /// `service@host/pid`: how the process is called in messages for people.
+    #[must_use]
+    pub fn name(&self) -> String {
+        let Presence { service, host, pid, .. } = &*self.presence;
+        format!("{service}@{host}/{pid}")
+    }
+    /// Time since the process joined.
+    #[must_use]
+    pub const fn clock(&self) -> Clock {
+        self.clock
+    }
+    /// What the process counts of itself.
+    #[must_use]
+    pub fn counters(&self) -> &Counters {
+        &self.counters
+    }
+
+    /// Leaves the mesh, within a second.
+    ///
+    /// Zenoh's own close may take ten seconds when a link is stuck; the process does not wait for that, since the
+    /// router forgets it as soon as its connection ends.
+    pub async fn leave(self) {
+        let session = self.session;
+        let close = tokio::task::spawn_blocking(move || session.close().wait());
+        if tokio::time::timeout(Duration::from_secs(1), close).await.is_err() {
+            tracing::warn!("the session did not close within 1 s and is dropped");
+        }
+    }
+}
+
+/// 64 bits that nobody can guess, from the standard library's own source of randomness.
+#[must_use]
+pub fn random_bits() -> u64 {
+    use std::hash::{BuildHasher as _, Hasher as _};
+    let mut hasher = std::collections::hash_map::RandomState::new().build_hasher();
+    hasher.write_u32(std::process::id());
+    hasher.write_u128(crate::clock::wall().to_bits().into());
+    hasher.finish()
+}
