@@ -86,10 +86,25 @@ pub fn decode_as<M: Message>(encoding: &str, bytes: &[u8]) -> Result<M, Refusal>
         && !schema.is_empty()
         && schema != schema_of::<M>()
     {
-        let got = schema.chars().take(80).collect();
-        return Err(Refusal::WrongType { expected: schema_of::<M>(), got });
+        return Err(Refusal::WrongType { expected: schema_of::<M>(), got: shown(schema, 80) });
     }
     decode(bytes)
+}
+
+/// Shows bytes of a message that Axle does not know, by what they say of themselves: CBOR as JSON.
+///
+/// For debugging tools only; services decode what they know.
+///
+/// # Errors
+/// Refuses more than 1 MiB, deep nesting, and what is not CBOR.
+pub fn inspect(bytes: &[u8]) -> Result<serde_json::Value, Refusal> {
+    const LIMIT: usize = 1024 * 1024;
+    if bytes.len() > LIMIT {
+        let (got, limit) = (bytes.len() as u64, LIMIT as u64);
+        return Err(Refusal::TooLarge { what: "unknown message in bytes".into(), got, limit });
+    }
+    ciborium::de::from_reader_with_recursion_limit(bytes, DEPTH)
+        .map_err(|fault| Refusal::malformed("unknown message", describe(&fault)))
 }
 
 fn too_large<M: Message>(got: usize) -> Refusal {
@@ -99,12 +114,18 @@ fn too_large<M: Message>(got: usize) -> Refusal {
 /// Says in a few words what ciborium found; its own texts are made for debugging.
 fn describe(fault: &ciborium::de::Error<std::io::Error>) -> String {
     match fault {
-        ciborium::de::Error::Io(_) => "the bytes end too early".to_owned(),
+        ciborium::de::Error::Io(_) => ENDS_EARLY.to_owned(),
         ciborium::de::Error::Syntax(at) => format!("byte {at} is not valid CBOR"),
-        // A hostile sender chooses this text in part: it is bounded.
-        ciborium::de::Error::Semantic(_, why) => why.chars().take(300).collect(),
+        ciborium::de::Error::Semantic(_, why) => shown(why, 300),
         ciborium::de::Error::RecursionLimitExceeded => format!("nested deeper than {DEPTH} levels"),
     }
+}
+
+const ENDS_EARLY: &str = "the bytes end too early";
+
+/// The beginning of a text that a hostile sender chose in part: bounded, and without what a terminal would obey.
+fn shown(text: &str, most: usize) -> String {
+    text.chars().take(most).map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect()
 }
 
 /// Reads `T` and puts the path of the faulty field before the reason: `points[2].x: NaN is not a finite number`.
@@ -117,6 +138,8 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Traced<T> {
             if path == "." {
                 fault.into_inner()
             } else {
+                // A key that cannot be read has no name.
+                let path = path.strip_suffix('?').map_or_else(|| path.clone(), |above| format!("{above}<key>"));
                 D::Error::custom(format_args!("{path}: {}", reason(&fault.into_inner())))
             }
         })
@@ -126,8 +149,17 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Traced<T> {
 /// The inner text of a decoder's error, without its debug wrapping.
 fn reason(fault: &impl std::fmt::Display) -> String {
     let text = fault.to_string();
-    match text.strip_prefix("Semantic(").and_then(|rest| rest.strip_suffix("\")")) {
-        Some(inner) => inner.split_once('"').map_or(text.clone(), |(_, words)| words.replace("\\\"", "\"")),
-        None => text,
+    // Inside a field the decoder's error is known by its text alone; these are ciborium's four kinds.
+    if text.starts_with("Io(") {
+        ENDS_EARLY.to_owned()
+    } else if text == "RecursionLimitExceeded" {
+        format!("nested deeper than {DEPTH} levels")
+    } else if let Some(at) = text.strip_prefix("Syntax(").and_then(|rest| rest.strip_suffix(')')) {
+        format!("byte {at} is not valid CBOR")
+    } else if let Some(inner) = text.strip_prefix("Semantic(").and_then(|rest| rest.strip_suffix("\")")) {
+        let words = inner.split_once('"').map_or(inner, |(_, words)| words);
+        words.replace("\\\"", "\"").replace("type: Option value", "type: null")
+    } else {
+        text
     }
 }

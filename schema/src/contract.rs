@@ -88,6 +88,9 @@ pub trait Corrector: Sized + Send + 'static {
     /// The kind of plan it follows.
     type Plan: Send + 'static;
 
+    /// The time from beat to beat that the parameters ask for.
+    fn period(params: &Self::Params) -> Seconds;
+
     /// Takes a task; `period` is the time from beat to beat.
     ///
     /// # Errors

@@ -76,9 +76,6 @@ pub struct Stream<M> {
 }
 
 impl<M: Message> Stream<M> {
-    /// The stream `name` of `service`. Public for correctors, whose names are in their own catalogue; everything else
-    /// is a constant of this module.
-    #[must_use]
     const fn new(service: &'static str, name: &'static str, urgency: Urgency) -> Self {
         Self { service, name, urgency, carries: PhantomData }
     }
@@ -174,8 +171,11 @@ pub struct Entry {
     answers: Option<fn() -> String>,
     /// What it is, for people.
     pub about: &'static str,
-    json: fn(&[u8]) -> Result<serde_json::Value, Refusal>,
+    json: ToJson,
 }
+
+/// Decodes a payload and shows it as JSON.
+type ToJson = fn(&[u8]) -> Result<serde_json::Value, Refusal>;
 
 impl Entry {
     /// The schema of what is published or asked, for example `axle.Dwm.v1`.
@@ -258,6 +258,10 @@ pub const fn corrector_progress(service: &'static str) -> Stream<CorrectorProgre
     Stream::new(service, "progress", Urgency::Control)
 }
 
+/// There and back again: the streams of `axle bench mesh`.
+pub const BENCH: (Stream<NavigatorData>, Stream<NavigatorData>) =
+    (Stream::new("bench", "there", Urgency::Control), Stream::new("bench", "back", Urgency::Control));
+
 /// Stands for the name of any corrector in [`TABLE`].
 pub const ANY_CORRECTOR: &str = "<corrector>";
 
@@ -291,7 +295,7 @@ pub const TABLE: &[Entry] = &[
 ];
 
 /// A message type that may stand in an encoding, beside those of [`TABLE`].
-const MORE_TYPES: &[(fn() -> String, fn(&[u8]) -> Result<serde_json::Value, Refusal>)] = &[
+const MORE_TYPES: &[(fn() -> String, ToJson)] = &[
     (schema_of::<Dwm>, json::<Dwm>),
     (schema_of::<Plan>, json::<Plan>),
     (schema_of::<Drive>, json::<Drive>),

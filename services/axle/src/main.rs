@@ -1,2 +1,39 @@
-//! The one command of Axle.
-fn main() {}
+//! The one command of Axle: every service, the router, and the tools around them.
+//!
+//! `main` only joins: it reads the command line, starts the log and hands over. Exit codes: 0 done, 1 failed, 2 the
+//! command line or a file is wrong.
+
+mod bench;
+mod catalog;
+mod chart;
+mod cli;
+mod command;
+mod demo;
+mod out;
+mod params;
+mod path;
+mod run;
+mod settings;
+mod signal;
+mod supervisor;
+mod topology;
+
+use clap::Parser as _;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let cli = cli::Cli::parse();
+    settings::start_log(&cli.settings.log);
+    // Zenoh needs a runtime of several threads; two are enough for a service.
+    let runtime = match tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build() {
+        Ok(runtime) => runtime,
+        Err(fault) => return out::fail(&anyhow::Error::new(fault).context("start the asynchronous runtime")),
+    };
+    let result = runtime.block_on(command::dispatch(cli));
+    // A thread that still waits for a router must not keep the process.
+    runtime.shutdown_background();
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(fault) => out::fail(&fault),
+    }
+}

@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 /// A beat that comes this much after its time counts as late.
-pub const LATE: Duration = Duration::from_millis(5);
+pub(crate) const LATE: Duration = Duration::from_millis(5);
 
 /// Counts of messages and beats.
 #[derive(Debug)]
@@ -27,18 +27,16 @@ pub struct Counters {
 
 impl Counters {
     pub(crate) fn new() -> Self {
-        // Two digits from 1 µs to 60 s: a few kilobytes, of fixed size. The bounds are constants that fit each other.
-        let lateness = Histogram::new_with_bounds(1, 60_000_000, 2).map_or_else(
-            |_| Mutex::new(Histogram::new(1).unwrap_or_else(|_| unreachable!("one digit is allowed"))),
-            Mutex::new,
-        );
+        // Two digits from 1 µs to 60 s: a few kilobytes, of fixed size.
+        #[allow(clippy::expect_used, reason = "the bounds are constants that fit each other")]
+        let lateness = Histogram::new_with_bounds(1, 60_000_000, 2).expect("bounds of a histogram");
         Self {
             sent: AtomicU64::new(0),
             received: AtomicU64::new(0),
             refused: AtomicU64::new(0),
             beats: AtomicU64::new(0),
             late: AtomicU64::new(0),
-            lateness_us: lateness,
+            lateness_us: Mutex::new(lateness),
             says: Mutex::new(Vec::new()),
             hears: Mutex::new(Vec::new()),
         }

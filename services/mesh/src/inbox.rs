@@ -36,6 +36,16 @@ pub struct Raw {
 }
 
 impl Raw {
+    fn of(sample: &Sample) -> Self {
+        Self {
+            key: sample.key_expr().as_str().to_owned(),
+            encoding: sample.encoding().to_string(),
+            payload: sample.payload().to_bytes().into_owned(),
+            attachment: sample.attachment().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default(),
+            deletes: sample.kind() == zenoh::sample::SampleKind::Delete,
+            received: crate::clock::wall(),
+        }
+    }
     /// The sequence, source and cause of the sample, if its attachment has them.
     #[must_use]
     pub fn meta(&self) -> Option<Meta> {
@@ -206,11 +216,11 @@ impl<M: Message> Inbox<M> {
             }
         }
     }
-    /// The bytes of the oldest sample, for a reader that counts faults itself.
-    pub fn take_bytes(&self) -> Option<Vec<u8>> {
+    /// The oldest sample as it came, for a reader that counts faults itself.
+    pub fn take_raw(&self) -> Option<Raw> {
         let sample = self.cell.oldest()?;
         self.counters.received.fetch_add(1, Relaxed);
-        Some(sample.payload().to_bytes().into_owned())
+        Some(Raw::of(&sample))
     }
     /// Samples that were forgotten because nobody took them in time.
     pub fn dropped(&self) -> u64 {
@@ -238,14 +248,7 @@ impl Tap {
     pub async fn next(&self) -> Raw {
         let sample = self.cell.next().await;
         self.counters.received.fetch_add(1, Relaxed);
-        Raw {
-            key: sample.key_expr().as_str().to_owned(),
-            encoding: sample.encoding().to_string(),
-            payload: sample.payload().to_bytes().into_owned(),
-            attachment: sample.attachment().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default(),
-            deletes: sample.kind() == zenoh::sample::SampleKind::Delete,
-            received: crate::clock::wall(),
-        }
+        Raw::of(&sample)
     }
     /// Samples that were forgotten because nobody took them in time.
     pub fn dropped(&self) -> u64 {

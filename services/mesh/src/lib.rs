@@ -8,6 +8,7 @@
 //! Three rules hold everywhere. Callbacks store, beats act. Every queue has a bound and forgets the oldest. Nothing
 //! awaits the network inside a beat.
 
+pub mod bare;
 mod beat;
 mod call;
 pub mod clock;

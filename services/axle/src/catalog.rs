@@ -1,0 +1,134 @@
+//! The catalogue of services: each stands here once, and gets its command, keys, parameters and documentation from it.
+//!
+//! A new corrector is one file in `services/correctors` and one line in [`CATALOG`].
+
+use crate::run::{self, Context, Running};
+use axle_correctors::DCorrector;
+use axle_pathdriver::Pathdriver;
+use axle_pathfinder::Pathfinder;
+use axle_schema::contract::Params as _;
+
+/// For whom a service works when no robot is named.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Scope {
+    /// For every robot: planners.
+    AllRobots,
+    /// For one robot.
+    OneRobot,
+}
+
+/// The kind of plan a corrector follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Takes {
+    /// Movements.
+    Drive,
+}
+
+/// One service.
+pub(crate) struct Entry {
+    /// Its name everywhere: command, keys, parameters, processes.
+    pub(crate) name: &'static str,
+    /// What it does, in one sentence.
+    pub(crate) about: &'static str,
+    /// For whom it works.
+    pub(crate) scope: Scope,
+    /// What it follows, if it is a corrector.
+    pub(crate) takes: Option<Takes>,
+    /// Its parameters file with all defaults and explanations.
+    pub(crate) params: &'static str,
+    /// Runs it until it is told to stop.
+    pub(crate) run: fn(Context) -> Running,
+}
+
+impl Entry {
+    const fn functional<F: run::functional::Served>(name: &'static str, about: &'static str) -> Self {
+        Self {
+            name,
+            about,
+            scope: Scope::AllRobots,
+            takes: None,
+            params: <F::Params as axle_schema::contract::Params>::FILE,
+            run: |context| Box::pin(run::functional::run::<F>(context)),
+        }
+    }
+    const fn corrector<C: run::corrector::Driven>(
+        name: &'static str,
+        takes: Takes,
+        about: &'static str,
+    ) -> Self {
+        Self {
+            name,
+            about,
+            scope: Scope::OneRobot,
+            takes: Some(takes),
+            params: <C::Params as axle_schema::contract::Params>::FILE,
+            run: |context| Box::pin(run::corrector::run::<C>(context)),
+        }
+    }
+}
+
+/// Every service of Axle, in the order of the way of a task.
+pub(crate) const CATALOG: &[Entry] = &[
+    Entry {
+        name: "pilot",
+        about: "Takes a task, has it planned, and sees it through.",
+        scope: Scope::OneRobot,
+        takes: None,
+        params: axle_pilot::PilotParams::FILE,
+        run: |context| Box::pin(run::pilot::run(context)),
+    },
+    Entry::functional::<Pathfinder>("pathfinder", "Turns way points into geometries."),
+    Entry::functional::<Pathdriver>("pathdriver", "Turns geometries into movements within the robot's limits."),
+    Entry::corrector::<DCorrector>(
+        "d-corrector",
+        Takes::Drive,
+        "Keeps the wheels at the distances they should have covered.",
+    ),
+    Entry {
+        name: "emulator",
+        about: "A robot in software, behind its gate.",
+        scope: Scope::OneRobot,
+        takes: None,
+        params: axle_emulator::EmulatorParams::FILE,
+        run: |context| Box::pin(run::emulator::run(context)),
+    },
+    Entry {
+        name: "source",
+        about: "Buffers measurements, and serves the newest and older ones.",
+        scope: Scope::OneRobot,
+        takes: None,
+        params: axle_source::SourceParams::FILE,
+        run: |context| Box::pin(run::source::run(context)),
+    },
+    Entry {
+        name: "navigator",
+        about: "Tells where the robot is, from its encoders.",
+        scope: Scope::OneRobot,
+        takes: None,
+        params: axle_navigator::NavigatorParams::FILE,
+        run: |context| Box::pin(run::navigator::run(context)),
+    },
+    Entry {
+        name: "recorder",
+        about: "Writes everything that is said about a robot to an MCAP file.",
+        scope: Scope::OneRobot,
+        takes: None,
+        params: axle_recorder::RecorderParams::FILE,
+        run: |context| Box::pin(run::recorder::run(context)),
+    },
+];
+
+/// The service of that name.
+pub(crate) fn find(name: &str) -> Option<&'static Entry> {
+    CATALOG.iter().find(|entry| entry.name == name)
+}
+
+/// The names of all services, for messages.
+pub(crate) fn names() -> String {
+    CATALOG.iter().map(|entry| entry.name).collect::<Vec<_>>().join(", ")
+}
+
+/// The names of all correctors, for messages.
+pub(crate) fn corrector_names() -> String {
+    CATALOG.iter().filter(|entry| entry.takes.is_some()).map(|entry| entry.name).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,159 @@
+//! Paths in the plane, with the same scale in both directions.
+
+use super::PathSeries;
+use super::page::{
+    self, Area, BLUE, GREEN, GREY, INK, ORANGE, PLOT, PURPLE, SKY, Sheet, VERMILION, at, failed, font, line,
+    px,
+};
+use super::thin::{bounds, is_fine, thin};
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+/// The most series of one chart.
+const MAX_SERIES: usize = 10;
+/// The most way points that are marked, and the most that all have a number.
+const MAX_MARKS: usize = 500;
+const FEW: usize = 60;
+/// The plot is at least and at most so high, in pixels.
+const HEIGHTS: [f64; 2] = [150.0, 600.0];
+/// The share of the plot that the data take.
+const SHARE: f64 = 0.86;
+
+/// Everything that lies in the plane, and where.
+pub(super) struct Plane<'a> {
+    paths: &'a [PathSeries],
+    way_points: Vec<(f64, f64)>,
+    centre: (f64, f64),
+    /// Metres in a pixel, in both directions.
+    pixel: f64,
+    height: u32,
+    empty: bool,
+}
+
+impl<'a> Plane<'a> {
+    pub(super) fn new(paths: &'a [PathSeries], way_points: &[(f64, f64)]) -> Self {
+        let paths = paths.get(..MAX_SERIES).unwrap_or(paths);
+        let way_points: Vec<_> = way_points.iter().copied().filter(is_fine).collect();
+        let all = paths.iter().flat_map(|path| &path.points).chain(&way_points).copied();
+        let found = bounds(all);
+        let [(left, right), (low, high)] = found.unwrap_or_default();
+        let (wide, tall) = (right - left, high - low);
+        // A long thin path gets a low plot; never one that is too low for its axis.
+        let ratio = if wide > 0.0 { tall / wide } else { tall.clamp(0.4, 1.0) };
+        let height = (f64::from(PLOT) * ratio).clamp(HEIGHTS[0], HEIGHTS[1]);
+        let pixel = (wide / f64::from(PLOT)).max(tall / height) / SHARE;
+        // A single point has no extent: a metre around it shows where it is.
+        let pixel = if pixel > 0.0 { pixel.max(1e-5) } else { 1.2 / height };
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "150 to 600")]
+        let height = height as u32;
+        let centre = (f64::midpoint(left, right), f64::midpoint(low, high));
+        Self { paths, way_points, centre, pixel, height, empty: found.is_none() }
+    }
+
+    /// Height of this part of the page, in pixels.
+    pub(super) const fn height(&self) -> u32 {
+        self.height + page::BOTTOM
+    }
+
+    pub(super) fn draw(&self, sheet: &Sheet<'_>) -> anyhow::Result<()> {
+        let half = (self.pixel * f64::from(PLOT) / 2.0, self.pixel * f64::from(self.height) / 2.0);
+        let (area, mut legend) = sheet.columns();
+        let x = self.centre.0 - half.0..self.centre.0 + half.0;
+        let y = self.centre.1 - half.1..self.centre.1 + half.1;
+        let mut chart = page::plot(&area, self.height, (x, "x, forward (m)"), (y, "y, left (m)"))?;
+        let mut ends = Vec::new();
+        for (index, path) in self.paths.iter().enumerate() {
+            let points = thin(&path.points, (self.pixel, self.pixel));
+            ends.extend(points.first().map(|&first| (first, index, true)));
+            ends.extend(points.last().map(|&last| (last, index, false)));
+            chart.draw_series(LineSeries::new(points, style(index))).map_err(failed)?;
+            legend.line(style(index), &path.name)?;
+        }
+        let plot = chart.plotting_area().strip_coord_spec();
+        let place = |point: (f64, f64)| self.place(point);
+        if let Some(&(first, ..)) = ends.first() {
+            start(&plot, place(first))?;
+            legend.mark("start", start)?;
+        }
+        for &(last, index, begins) in &ends {
+            if !begins {
+                end(&plot, place(last), ink(index))?;
+            }
+        }
+        if !ends.is_empty() {
+            legend.mark("end of a path", |area, place| end(area, place, INK))?;
+        }
+        if !self.way_points.is_empty() {
+            self.mark_way_points(&plot)?;
+            legend.mark("way point", dot)?;
+        }
+        if self.empty {
+            page::remark(&plot, self.height, "nothing to drive")?;
+        }
+        Ok(())
+    }
+
+    /// Where a point of the plane is in the plot.
+    fn place(&self, (x, y): (f64, f64)) -> (i32, i32) {
+        let right = (x - self.centre.0) / self.pixel + f64::from(PLOT) / 2.0;
+        let down = f64::from(self.height) / 2.0 - (y - self.centre.1) / self.pixel;
+        (at(right), at(down))
+    }
+
+    /// Dots and numbers. Way points at one place share a label, which stands on the outer side of the path.
+    fn mark_way_points(&self, plot: &Area<'_>) -> anyhow::Result<()> {
+        let step = self.way_points.len().div_ceil(MAX_MARKS);
+        // Among many way points only some have room for a number.
+        let (crowded, room) = if self.way_points.len() > FEW { (true, 44.0) } else { (false, 14.0) };
+        let mut labels: Vec<((f64, f64), Vec<usize>)> = Vec::new();
+        for (index, &point) in self.way_points.iter().enumerate().step_by(step) {
+            dot(plot, self.place(point))?;
+            let near =
+                |((x, y), _): &&mut ((f64, f64), _)| (point.0 - x).hypot(point.1 - y) < room * self.pixel;
+            match labels.iter_mut().find(near) {
+                Some((_, numbers)) if !crowded => numbers.push(index + 1),
+                Some(_) => {}
+                None => labels.push((point, vec![index + 1])),
+            }
+        }
+        labels.into_iter().try_for_each(|(point, numbers)| self.label(plot, point, &numbers))
+    }
+
+    fn label(&self, plot: &Area<'_>, point: (f64, f64), numbers: &[usize]) -> anyhow::Result<()> {
+        let outward = |value: f64, centre: f64| if value < centre { -1.0 } else { 1.0 };
+        let (right, up) = (outward(point.0, self.centre.0), outward(point.1, self.centre.1));
+        let anchor = Pos::new(if right > 0.0 { HPos::Left } else { HPos::Right }, VPos::Center);
+        let (x, y) = self.place(point);
+        let mut text: Vec<String> = numbers.iter().take(3).map(usize::to_string).collect();
+        if numbers.len() > 3 {
+            text.push("…".to_owned());
+        }
+        let place = (x + at(11.0 * right), y - at(13.0 * up));
+        plot.draw(&Text::new(text.join(", "), place, font(13.0).pos(anchor))).map_err(failed)
+    }
+}
+
+fn ink(index: usize) -> RGBColor {
+    const INKS: [RGBColor; 7] = [GREY, BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY];
+    INKS[index % INKS.len()]
+}
+
+/// Each line is thinner than those below it.
+fn style(index: usize) -> ShapeStyle {
+    const WIDTHS: [u32; 3] = [70, 32, 18];
+    line(ink(index).into(), WIDTHS[index.min(2)])
+}
+
+fn start(area: &Area<'_>, place: (i32, i32)) -> anyhow::Result<()> {
+    area.draw(&Circle::new(place, px(9), line(GREEN.into(), 25))).map_err(failed)
+}
+
+fn end(area: &Area<'_>, (x, y): (i32, i32), ink: RGBColor) -> anyhow::Result<()> {
+    let r = at(6.0);
+    let square = [(x - r, y - r), (x + r, y - r), (x + r, y + r), (x - r, y + r), (x - r, y - r)];
+    area.draw(&PathElement::new(square, line(ink.into(), 20))).map_err(failed)
+}
+
+fn dot(area: &Area<'_>, place: (i32, i32)) -> anyhow::Result<()> {
+    area.draw(&Circle::new(place, px(4), INK.filled())).map_err(failed)
+}

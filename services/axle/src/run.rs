@@ -1,0 +1,70 @@
+//! Services as processes: one file for each kind, which joins the pure value to the mesh.
+
+pub(crate) mod corrector;
+pub(crate) mod emulator;
+pub(crate) mod functional;
+pub(crate) mod navigator;
+pub(crate) mod pilot;
+pub(crate) mod recorder;
+pub(crate) mod source;
+
+use crate::catalog::{Entry, Scope};
+use crate::settings::{Settings, join};
+use crate::signal::Stop;
+use axle_mesh::{Mesh, Patience, Visible};
+use axle_schema::RobotId;
+use std::future::Future;
+use std::path::PathBuf;
+use std::pin::Pin;
+
+/// A running service.
+pub(crate) type Running = Pin<Box<dyn Future<Output = anyhow::Result<()>> + Send>>;
+
+/// What a service needs to run.
+pub(crate) struct Context {
+    /// The mesh it is on.
+    pub(crate) mesh: Mesh,
+    /// Its catalogue name.
+    pub(crate) service: &'static str,
+    /// The robot it works for; `None` = all.
+    pub(crate) robot: Option<RobotId>,
+    /// Its parameters file.
+    pub(crate) params: Option<PathBuf>,
+    /// When to stop.
+    pub(crate) stop: Stop,
+}
+
+impl Context {
+    /// The robot it works for.
+    ///
+    /// # Errors
+    /// Services of one robot are always started with one.
+    pub(crate) fn one_robot(&self) -> anyhow::Result<RobotId> {
+        self.robot.clone().ok_or_else(|| anyhow::anyhow!("{} needs a robot", self.service))
+    }
+    /// Everything is declared: from now on others see the service.
+    pub(crate) fn ready(&self) -> anyhow::Result<Visible> {
+        let visible = self.mesh.become_visible()?;
+        let robot = self.robot.as_ref().map_or("all robots", RobotId::as_str);
+        tracing::info!("{} for {robot} is ready", self.service);
+        Ok(visible)
+    }
+}
+
+/// Runs one service until it is told to stop.
+pub(crate) async fn run(entry: &'static Entry, settings: &Settings, params: Option<PathBuf>) -> anyhow::Result<()> {
+    let mut stop = crate::signal::stop()?;
+    let robot = match entry.scope {
+        Scope::AllRobots => settings.robot.clone(),
+        Scope::OneRobot => Some(settings.one_robot()?),
+    };
+    let joining = join(settings.mesh(entry.name, robot.as_ref()), Patience::Forever);
+    let mesh = tokio::select! {
+        mesh = joining => mesh?,
+        () = stop.wait() => return Ok(()),
+    };
+    let context = Context { mesh: mesh.clone(), service: entry.name, robot, params, stop };
+    let result = (entry.run)(context).await;
+    mesh.leave().await;
+    result
+}

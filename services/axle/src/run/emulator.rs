@@ -1,0 +1,154 @@
+//! The emulator as a process: a robot in software behind its gate.
+//!
+//! The gate and the wheels live on a thread of their own, so that nothing else in the process can keep the gate from
+//! braking. Zenoh's callbacks fill bounded queues; the beat empties them.
+
+use super::Context;
+use crate::params::load;
+use axle_emulator::{Emulator, EmulatorParams};
+use axle_gate::{COMMANDS_PER_BEAT, Gate, Headline};
+use axle_mesh::{Inbox, Mesh, Publisher, Server};
+use axle_schema::command::{AllStop, Command, Done, Enable, GateState, Lease, LeaseAsk, Release};
+use axle_schema::meta::Cause;
+use axle_schema::{EncodersData, InertialData, NavigatorData, Refusal, RobotId, Seconds, key};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+/// The gate's state is said at least this often.
+const STATE_PERIOD: Seconds = Seconds(1.0);
+
+/// Emulates until it is told to stop.
+pub(crate) async fn run(mut context: Context) -> anyhow::Result<()> {
+    let params: EmulatorParams = load(context.params.as_deref())?;
+    let robot = context.one_robot()?;
+    let mesh = context.mesh.clone();
+    let gate = Gate::new(params.gate, &params.robot, mesh.boot(), None)?;
+    let mut board = Board::new(&mesh, &robot, gate, &params)?;
+    let stopping = Arc::new(AtomicBool::new(false));
+    let thread = mesh.beat_on_own_thread("gate", params.rates.beat, Arc::clone(&stopping), move |now| {
+        board.beat(now);
+        true
+    })?;
+    let _visible = context.ready()?;
+    context.stop.wait().await;
+    stopping.store(true, Relaxed);
+    // The beat is a few milliseconds long; joining blocks for one at the most.
+    drop(thread.join());
+    Ok(())
+}
+
+/// A stream that is said at a rate of its own, which beats need not divide.
+struct Paced<M> {
+    publisher: Publisher<M>,
+    period: Seconds,
+    due: Seconds,
+}
+
+impl<M: axle_schema::Message> Paced<M> {
+    fn new(publisher: Publisher<M>, hz: f64) -> Self {
+        Self { publisher, period: Seconds(1.0 / hz), due: Seconds::ZERO }
+    }
+    fn put(&mut self, now: Seconds, cause: Option<Cause>, message: impl FnOnce() -> M) {
+        if now >= self.due {
+            // What was missed is not made up for.
+            self.due = (self.due + self.period).max(now);
+            say(self.publisher.put(&message(), cause).map(drop));
+        }
+    }
+}
+
+fn say(said: Result<(), Refusal>) {
+    if let Err(refusal) = said {
+        tracing::warn!("a measurement could not be said: {refusal}");
+    }
+}
+
+/// The emulated robot, its gate, and all its lines.
+struct Board {
+    gate: Gate,
+    emulator: Emulator,
+    leases: Server<LeaseAsk, Lease>,
+    releases: Server<Release, Done>,
+    enables: Server<Enable, Done>,
+    commands: Inbox<Command>,
+    stops: Inbox<AllStop>,
+    state: Publisher<GateState>,
+    encoders: Paced<EncodersData>,
+    inertial: Paced<InertialData>,
+    truth: Paced<NavigatorData>,
+    said: Option<(Headline, Seconds)>,
+    overflowed: u64,
+    obeyed: Option<Cause>,
+}
+
+impl Board {
+    fn new(mesh: &Mesh, robot: &RobotId, gate: Gate, params: &EmulatorParams) -> anyhow::Result<Self> {
+        Ok(Self {
+            gate,
+            emulator: Emulator::new(*params)?,
+            leases: mesh.server(&key::LEASE.of(Some(robot)))?,
+            releases: mesh.server(&key::RELEASE.of(Some(robot)))?,
+            enables: mesh.server(&key::ENABLE.of(Some(robot)))?,
+            commands: mesh.inbox(&key::COMMAND.of(robot), COMMANDS_PER_BEAT as usize)?,
+            stops: mesh.inbox(&key::STOP.of(robot), 8)?,
+            state: mesh.publisher(&key::GATE_STATE.of(robot))?,
+            encoders: Paced::new(mesh.publisher(&key::ENCODERS.of(robot))?, params.rates.encoders_hz),
+            inertial: Paced::new(mesh.publisher(&key::INERTIAL.of(robot))?, params.rates.inertial_hz),
+            truth: Paced::new(mesh.publisher(&key::TRUTH.of(robot))?, params.rates.truth_hz),
+            said: None,
+            overflowed: 0,
+            obeyed: None,
+        })
+    }
+
+    fn beat(&mut self, now: Seconds) {
+        // Stops come first: nothing that arrived with them may move a wheel.
+        while let Some(stop) = self.stops.take() {
+            tracing::warn!(stop = %stop.message.id, "AllStop by {}", stop.message.by);
+            self.gate.stop(now, stop.message.id);
+        }
+        while let Some(asked) = self.leases.try_next() {
+            let answer = asked.question().and_then(|ask| self.gate.lease(now, &ask));
+            asked.reply(answer);
+        }
+        while let Some(asked) = self.releases.try_next() {
+            let answer = asked.question().and_then(|release| self.gate.release(now, &release));
+            asked.reply(answer.map(|()| Done {}));
+        }
+        while let Some(asked) = self.enables.try_next() {
+            let answer = asked.question().and_then(|enable| self.gate.enable(now, &enable));
+            asked.reply(answer.map(|()| Done {}));
+        }
+        self.hear_commands(now);
+        let wheels = self.gate.beat(now);
+        self.emulator.advance(now, wheels);
+        self.say_state(now);
+        let Self { emulator, encoders, inertial, truth, obeyed, .. } = self;
+        encoders.put(now, *obeyed, || emulator.encoders());
+        inertial.put(now, *obeyed, || emulator.inertial());
+        truth.put(now, *obeyed, || emulator.truth());
+    }
+
+    fn hear_commands(&mut self, now: Seconds) {
+        let dropped = self.commands.dropped();
+        self.gate.overflowed(dropped - self.overflowed);
+        self.overflowed = dropped;
+        for _ in 0..COMMANDS_PER_BEAT {
+            let Some(raw) = self.commands.take_raw() else { break };
+            match self.gate.command(now, &raw.encoding, &raw.payload) {
+                Ok(()) => self.obeyed = raw.meta().map(|meta| Cause { source: meta.source, seq: meta.seq }),
+                Err(reject) => tracing::debug!("command refused: {reject:?}"),
+            }
+        }
+    }
+
+    /// Says the gate's state on change and once a second.
+    fn say_state(&mut self, now: Seconds) {
+        let headline = self.gate.headline();
+        let is_news = self.said.is_none_or(|(said, at)| said != headline || now - at >= STATE_PERIOD);
+        if is_news {
+            self.said = Some((headline, now));
+            say(self.state.put(&self.gate.state(now), None).map(drop));
+        }
+    }
+}

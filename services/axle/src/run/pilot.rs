@@ -1,0 +1,268 @@
+//! Pilot as a process: takes a task, asks the planners, hands the plan to a corrector, says how far it is.
+
+use super::Context;
+use crate::catalog::{self, Takes};
+use crate::params::load;
+use axle_mesh::{Mesh, Publisher, Retry, random_bits};
+use axle_pilot::{Journey, PilotParams};
+use axle_schema::command::Done;
+use axle_schema::key;
+use axle_schema::task::{Accepted, Cancel, CorrectorProgress, GoAsk, Phase, PilotProgress, Task};
+use axle_schema::{
+    Drive, DriveAsk, NavigatorData, Plan, PlanAsk, Pose, Refusal, RobotId, Seconds, TaskId, WayTask,
+};
+use std::collections::BTreeMap;
+use std::time::Duration;
+use tokio::sync::mpsc;
+use tokio::task::JoinHandle;
+
+/// How often progress is said while nothing changes, and an unheard order is repeated.
+const PACE: Seconds = Seconds(0.1);
+
+/// Pilots until it is told to stop.
+pub(crate) async fn run(mut context: Context) -> anyhow::Result<()> {
+    let params: PilotParams = load(context.params.as_deref())?;
+    if catalog::find(&params.corrector).is_none_or(|entry| entry.takes.is_none()) {
+        return Err(crate::out::usage(unknown_corrector(&params.corrector)));
+    }
+    let robot = context.one_robot()?;
+    let mesh = &context.mesh;
+    let goes = mesh.server::<GoAsk, Accepted>(&key::GO.of(Some(&robot)))?;
+    let cancels = mesh.server::<Cancel, Done>(&key::GO_CANCEL.of(Some(&robot)))?;
+    let poses = mesh.inbox(&key::POSE.of(&robot), 1)?;
+    let (mut pilot, mut words, mut plans) = Pilot::new(mesh.clone(), robot, params)?;
+    let _visible = context.ready()?;
+    let mut beat = mesh.beat(PACE);
+    loop {
+        let now = mesh.clock().now();
+        tokio::select! {
+            asked = goes.next() => {
+                let answer = asked.question().and_then(|ask| pilot.go(ask, now));
+                asked.reply(answer);
+            }
+            asked = cancels.next() => {
+                let answer = asked.question().and_then(|cancel| pilot.cancel(cancel.id, now));
+                asked.reply(answer);
+            }
+            heard = poses.next() => pilot.see(heard.message),
+            Some(said) = words.recv() => pilot.hear(&said, now),
+            Some((task, planned)) = plans.recv() => pilot.drive(task, planned, now),
+            at = beat.next() => pilot.beat(at),
+            () = context.stop.wait() => {
+                pilot.end(Phase::Failed(Refusal::Failed { why: "the pilot was stopped".into() }), now);
+                return Ok(());
+            }
+        }
+    }
+}
+
+fn unknown_corrector(name: &str) -> Refusal {
+    let got = name.chars().take(64).collect();
+    Refusal::Unknown { what: "corrector".into(), got, known: catalog::corrector_names() }
+}
+
+/// The lines to one corrector.
+struct Line {
+    orders: Publisher<Task<Drive>>,
+    cancels: Publisher<Cancel>,
+}
+
+/// The plans of a task.
+struct Planned {
+    plan: Plan,
+    drive: Drive,
+}
+
+struct Pilot {
+    mesh: Mesh,
+    robot: RobotId,
+    params: PilotParams,
+    lines: BTreeMap<&'static str, Line>,
+    progress: Publisher<PilotProgress>,
+    ways: Publisher<Task<WayTask>>,
+    plans: Publisher<Task<Plan>>,
+    drives: Publisher<Task<Drive>>,
+    pose: Option<NavigatorData>,
+    journey: Option<Journey>,
+    planning: Option<JoinHandle<()>>,
+    planned: mpsc::Sender<(TaskId, Result<Planned, Refusal>)>,
+    /// The order that the corrector has not answered yet.
+    order: Option<Task<Drive>>,
+}
+
+/// What correctors say, and what planners answer.
+type Words = mpsc::Receiver<CorrectorProgress>;
+type Plans = mpsc::Receiver<(TaskId, Result<Planned, Refusal>)>;
+
+impl Pilot {
+    fn new(mesh: Mesh, robot: RobotId, params: PilotParams) -> anyhow::Result<(Self, Words, Plans)> {
+        let mut lines = BTreeMap::new();
+        let (word, words) = mpsc::channel(32);
+        let (planned, plans) = mpsc::channel(1);
+        for entry in catalog::CATALOG.iter().filter(|entry| entry.takes == Some(Takes::Drive)) {
+            let line = Line {
+                orders: mesh.publisher(&key::corrector_task::<Drive>(entry.name).of(&robot))?,
+                cancels: mesh.publisher(&key::corrector_cancel(entry.name).of(&robot))?,
+            };
+            let progress = mesh.inbox(&key::corrector_progress(entry.name).of(&robot), 32)?;
+            let word = word.clone();
+            tokio::spawn(async move { while word.send(progress.next().await.message).await.is_ok() {} });
+            lines.insert(entry.name, line);
+        }
+        let pilot = Self {
+            progress: mesh.publisher(&key::GO_PROGRESS.of(&robot))?,
+            ways: mesh.publisher(&key::GO_WAY.of(&robot))?,
+            plans: mesh.publisher(&key::GO_PLAN.of(&robot))?,
+            drives: mesh.publisher(&key::GO_DRIVE.of(&robot))?,
+            mesh,
+            robot,
+            params,
+            lines,
+            pose: None,
+            journey: None,
+            planning: None,
+            planned,
+            order: None,
+        };
+        Ok((pilot, words, plans))
+    }
+
+    /// Takes a task. A running one is replaced.
+    fn go(&mut self, ask: GoAsk, now: Seconds) -> Result<Accepted, Refusal> {
+        let corrector = ask.corrector.unwrap_or_else(|| self.params.corrector.clone());
+        if !self.lines.contains_key(corrector.as_str()) {
+            return Err(unknown_corrector(&corrector));
+        }
+        let Some(seen) = self.pose else {
+            let hint = "no pose has been heard; are `axle run navigator`, `source` and the robot or `emulator` up?";
+            return Err(Refusal::unavailable("navigator", hint));
+        };
+        self.end(Phase::Replaced, now);
+        let id = TaskId::from_random(random_bits());
+        let way = Task { id, plan: ask.way.clone() };
+        self.say("the task", self.ways.put(&way, None).map(drop));
+        self.planning = Some(self.ask_planners(id, ask.way.clone(), seen.pose));
+        self.journey = Some(Journey::begin(id, ask.way, corrector, seen.pose, now));
+        self.say_progress(now);
+        tracing::info!(task = %id, "task accepted");
+        Ok(Accepted { task: id })
+    }
+
+    /// Asks Pathfinder and Pathdriver beside the loop, which stays able to hear and to cancel.
+    fn ask_planners(&self, task: TaskId, way: WayTask, start: Pose) -> JoinHandle<()> {
+        let (mesh, robot, params) = (self.mesh.clone(), self.robot.clone(), self.params.clone());
+        let planned = self.planned.clone();
+        let deadline = Duration::from_secs_f64(params.deadline.0);
+        tokio::spawn(async move {
+            let plans = async {
+                let ask = PlanAsk { way, start: Some(start) };
+                let plan = mesh.ask(&key::PLAN, Some(&robot), &ask, deadline, Retry::Idempotent).await?;
+                let ask = DriveAsk { legs: plan.legs.clone(), speeds: None, robot: Some(params.robot) };
+                let drive = mesh.ask(&key::DRIVE, Some(&robot), &ask, deadline, Retry::Idempotent).await?;
+                Ok(Planned { plan, drive })
+            };
+            // The pilot that no longer listens has stopped.
+            drop(planned.send((task, plans.await)).await);
+        })
+    }
+
+    fn cancel(&mut self, task: TaskId, now: Seconds) -> Result<Done, Refusal> {
+        if self.journey.as_ref().is_some_and(|journey| journey.task() == task) {
+            self.end(Phase::Canceled, now);
+            Ok(Done {})
+        } else {
+            let known = self.journey.as_ref().map_or_else(|| "none".to_owned(), |journey| journey.task().to_string());
+            Err(Refusal::Unknown { what: "task".into(), got: task.to_string(), known })
+        }
+    }
+
+    fn see(&mut self, data: NavigatorData) {
+        self.pose = Some(data);
+        if let Some(journey) = &mut self.journey {
+            journey.see(&self.params, data.pose);
+        }
+    }
+
+    fn hear(&mut self, said: &CorrectorProgress, now: Seconds) {
+        let Some(journey) = &mut self.journey else { return };
+        if said.task == journey.task() {
+            self.order = None;
+        }
+        let before = journey.phase().clone();
+        journey.hear(&self.params, said, now);
+        if *journey.phase() != before {
+            self.say_progress(now);
+        }
+    }
+
+    fn drive(&mut self, id: TaskId, planned: Result<Planned, Refusal>, now: Seconds) {
+        let Some(journey) = self.journey.as_mut().filter(|journey| journey.task() == id) else { return };
+        self.planning = None;
+        match planned {
+            Ok(Planned { plan, drive }) => {
+                journey.drive(now);
+                self.say("the plan", self.plans.put(&Task { id, plan }, None).map(drop));
+                let order = Task { id, plan: drive };
+                self.say("the movements", self.drives.put(&order, None).map(drop));
+                self.order = Some(order);
+                self.repeat_order();
+                self.say_progress(now);
+            }
+            Err(refusal) => self.end(Phase::Failed(refusal), now),
+        }
+    }
+
+    /// Gives the order to the corrector; again at every beat until it answers, since a sample may be lost.
+    fn repeat_order(&self) {
+        let (Some(journey), Some(order)) = (&self.journey, &self.order) else { return };
+        if let Some(line) = self.lines.get(journey.corrector()) {
+            self.say("the order", line.orders.put(order, None).map(drop));
+        }
+    }
+
+    fn beat(&mut self, now: Seconds) {
+        self.repeat_order();
+        let Some(journey) = &mut self.journey else { return };
+        if journey.phase().is_over() {
+            return;
+        }
+        journey.wait(&self.params, now);
+        if journey.phase().is_over() {
+            self.dismiss();
+        }
+        self.say_progress(now);
+    }
+
+    /// Ends the running task, if there is one, and tells the corrector.
+    fn end(&mut self, phase: Phase, now: Seconds) {
+        let Some(journey) = &mut self.journey else { return };
+        if journey.phase().is_over() {
+            return;
+        }
+        journey.end(phase, now);
+        self.dismiss();
+        self.say_progress(now);
+    }
+
+    fn dismiss(&mut self) {
+        self.order = None;
+        if let Some(planning) = self.planning.take() {
+            planning.abort();
+        }
+        let Some(journey) = &self.journey else { return };
+        if let Some(line) = self.lines.get(journey.corrector()) {
+            self.say("the cancellation", line.cancels.put(&Cancel { id: journey.task() }, None).map(drop));
+        }
+    }
+
+    fn say_progress(&self, now: Seconds) {
+        let Some(journey) = &self.journey else { return };
+        self.say("progress", self.progress.put(&journey.progress(now), None).map(drop));
+    }
+
+    fn say(&self, what: &str, said: Result<(), Refusal>) {
+        if let Err(refusal) = said {
+            tracing::warn!(robot = %self.robot, "{what} could not be said: {refusal}");
+        }
+    }
+}

@@ -1,0 +1,266 @@
+//! One child process per service: started, watched, restarted with growing pauses, and ended together.
+//!
+//! The children stand in process groups of their own, so that Ctrl-C reaches the supervisor alone and it can end
+//! them in order: the correctors first, which give the wheels back, then the rest when the robot stands. A child
+//! whose supervisor is killed sees the end of its stdin and ends too.
+
+use crate::out::note;
+use crate::signal::PARENT;
+use crate::topology::Topology;
+use anyhow::Context as _;
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+use tokio::io::{AsyncBufReadExt as _, AsyncRead, BufReader};
+use tokio::process::{Child, Command};
+use tokio::sync::watch;
+use tokio::task::JoinHandle;
+use tokio::time::{Instant, timeout};
+
+/// The first and the longest pause before a restart; a child that lived for `STEADY` begins anew.
+const PAUSES: (Duration, Duration) = (Duration::from_millis(200), Duration::from_secs(5));
+const STEADY: Duration = Duration::from_secs(10);
+/// How long correctors may take to give the wheels back, and everybody to end, before they are killed.
+const BRAKING: Duration = Duration::from_millis(900);
+const ENDING: Duration = Duration::from_millis(800);
+
+/// Where the children's words go.
+#[derive(Clone)]
+pub(crate) enum Log {
+    /// To stderr, each line with the name of its service.
+    Prefixed,
+    /// To a file.
+    File(Arc<Mutex<std::fs::File>>),
+}
+
+impl Log {
+    fn line(&self, name: &str, line: &str) {
+        match self {
+            Self::Prefixed => note(&format!("{name:>12} | {line}")),
+            Self::File(file) => {
+                let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
+                // A log that cannot be written must not stop a robot.
+                drop(writeln!(file, "{name:>12} | {line}"));
+            }
+        }
+    }
+}
+
+/// What to run.
+#[derive(Clone, Debug)]
+pub(crate) struct Job {
+    /// The service, or `router`.
+    pub(crate) name: String,
+    /// The robot, where one is named.
+    pub(crate) robot: Option<String>,
+    args: Vec<String>,
+}
+
+/// The children of one computer.
+pub(crate) struct Supervisor {
+    children: Vec<Watched>,
+    /// Written parameters; removed with the supervisor.
+    _params: ParamsDirectory,
+}
+
+struct Watched {
+    job: Job,
+    pid: Arc<Mutex<Option<u32>>>,
+    ending: watch::Sender<bool>,
+    watching: JoinHandle<()>,
+}
+
+/// A directory of parameter files that goes with the supervisor.
+struct ParamsDirectory(PathBuf);
+
+impl Drop for ParamsDirectory {
+    fn drop(&mut self) {
+        drop(std::fs::remove_dir_all(&self.0));
+    }
+}
+
+impl Supervisor {
+    /// Starts the router and the services of one computer.
+    ///
+    /// # Errors
+    /// When a parameter file cannot be written; children that cannot start are restarted and logged.
+    pub(crate) fn start(topology: &Topology, host: &str, endpoint: &str, level: &str, log: &Log) -> anyhow::Result<Self> {
+        let directory = std::env::temp_dir().join(format!("axle-{}", std::process::id()));
+        std::fs::create_dir_all(&directory).context("make a directory for parameters")?;
+        let params = ParamsDirectory(directory);
+        let mut jobs = vec![Job {
+            name: "router".into(),
+            robot: None,
+            args: ["router", "--listen", endpoint, "--log", level].map(String::from).to_vec(),
+        }];
+        for (index, service) in topology.services_of(host).enumerate() {
+            let mut args = ["run", &service.kind, "--connect", endpoint, "--host", host, "--log", level]
+                .map(String::from)
+                .to_vec();
+            if let Some(robot) = &service.robot {
+                args.extend(["--robot".into(), robot.to_string()]);
+            }
+            let table = topology.params_of(service)?;
+            if !table.is_empty() {
+                let file = params.0.join(format!("{index}-{}.toml", service.kind));
+                std::fs::write(&file, toml::to_string(&table)?).context("write parameters")?;
+                args.extend(["--params".into(), file.display().to_string()]);
+            }
+            let robot = service.robot.as_ref().map(ToString::to_string);
+            jobs.push(Job { name: service.kind.clone(), robot, args });
+        }
+        let program = std::env::current_exe().context("find the axle program")?;
+        let children = jobs.into_iter().map(|job| Watched::start(job, &program, log)).collect();
+        Ok(Self { children, _params: params })
+    }
+
+    /// The jobs, in the order of their start, with the processes that do them now.
+    pub(crate) fn processes(&self) -> Vec<(Job, Option<u32>)> {
+        self.children.iter().map(|child| (child.job.clone(), child.pid())).collect()
+    }
+
+    /// The names of the children that gave up: a wrong command line or file is not mended by a restart.
+    pub(crate) fn given_up(&self) -> Vec<String> {
+        self.children
+            .iter()
+            .filter(|child| child.watching.is_finished())
+            .map(|child| child.job.name.clone())
+            .collect()
+    }
+
+    /// Ends all children: correctors first, then the rest; within two seconds nothing is left.
+    pub(crate) async fn stop(self) {
+        let correctors = |child: &&Watched| child.job.name.ends_with("-corrector");
+        for child in self.children.iter().filter(correctors) {
+            child.tell(Signal::SIGTERM);
+        }
+        // Correctors that have ended have given the wheels back; the gate brakes meanwhile.
+        let braking = Instant::now() + BRAKING;
+        while self.children.iter().filter(correctors).any(|child| child.pid().is_some()) && Instant::now() < braking {
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+        if self.children.iter().any(|child| correctors(&child)) {
+            tokio::time::sleep(braking.saturating_duration_since(Instant::now()).min(Duration::from_millis(300))).await;
+        }
+        for child in &self.children {
+            child.tell(Signal::SIGTERM);
+        }
+        let ending = Instant::now() + ENDING;
+        for child in self.children {
+            let Watched { watching, pid, .. } = child;
+            if timeout(ending.saturating_duration_since(Instant::now()), watching).await.is_err() {
+                send(&pid, Signal::SIGKILL);
+            }
+        }
+    }
+}
+
+impl Watched {
+    fn start(job: Job, program: &Path, log: &Log) -> Self {
+        let pid = Arc::new(Mutex::new(None));
+        let (ending, is_ending) = watch::channel(false);
+        let watching =
+            tokio::spawn(watch_over(job.clone(), program.to_owned(), log.clone(), Arc::clone(&pid), is_ending));
+        Self { job, pid, ending, watching }
+    }
+    fn pid(&self) -> Option<u32> {
+        *self.pid.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+    fn tell(&self, signal: Signal) {
+        let _ = self.ending.send(true);
+        send(&self.pid, signal);
+    }
+}
+
+fn send(pid: &Mutex<Option<u32>>, signal: Signal) {
+    let pid = *pid.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(pid) = pid.and_then(|pid| i32::try_from(pid).ok()) {
+        // A child that has just ended by itself is what was wanted.
+        let _ = kill(Pid::from_raw(pid), signal);
+    }
+}
+
+/// Runs a child again and again until it is told to end.
+async fn watch_over(
+    job: Job,
+    program: PathBuf,
+    log: Log,
+    pid: Arc<Mutex<Option<u32>>>,
+    mut ending: watch::Receiver<bool>,
+) {
+    let set_pid = |value| *pid.lock().unwrap_or_else(PoisonError::into_inner) = value;
+    let mut pause = PAUSES.0;
+    loop {
+        let born = Instant::now();
+        let outcome = match spawn(&job, &program) {
+            Ok(mut child) => {
+                set_pid(child.id());
+                // The pipe to its stdin must outlive the child's wait: its end is the child's sign to end.
+                let stdin = child.stdin.take();
+                let words = listen(&mut child, &job.name, &log);
+                let status = child.wait().await;
+                set_pid(None);
+                drop(stdin);
+                for word in words {
+                    drop(word.await);
+                }
+                status.map_or_else(|fault| (fault.to_string(), None), |status| (status.to_string(), status.code()))
+            }
+            Err(fault) => (fault.to_string(), None),
+        };
+        if *ending.borrow() {
+            return;
+        }
+        if outcome.1 == Some(2) {
+            log.line(&job.name, "is not restarted: its command line or its parameters are wrong");
+            return;
+        }
+        if born.elapsed() >= STEADY {
+            pause = PAUSES.0;
+        }
+        log.line(&job.name, &format!("ended ({}); starts again in {:.1} s", outcome.0, pause.as_secs_f64()));
+        let told = timeout(pause, ending.wait_for(|ending| *ending)).await;
+        if told.is_ok() {
+            return;
+        }
+        pause = (pause * 2).min(PAUSES.1);
+    }
+}
+
+fn spawn(job: &Job, program: &Path) -> std::io::Result<Child> {
+    Command::new(program)
+        .args(&job.args)
+        .env(PARENT, "stdin")
+        .env_remove("AXLE_ROBOT")
+        .env_remove("AXLE_PARAMS")
+        .env_remove("AXLE_LISTEN")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .process_group(0)
+        .kill_on_drop(true)
+        .spawn()
+}
+
+/// Passes the child's lines on to the log.
+fn listen(child: &mut Child, name: &str, log: &Log) -> Vec<JoinHandle<()>> {
+    let mut words = Vec::new();
+    if let Some(stdout) = child.stdout.take() {
+        words.push(tokio::spawn(pass_on(stdout, name.to_owned(), log.clone())));
+    }
+    if let Some(stderr) = child.stderr.take() {
+        words.push(tokio::spawn(pass_on(stderr, name.to_owned(), log.clone())));
+    }
+    words
+}
+
+async fn pass_on(from: impl AsyncRead + Unpin, name: String, log: Log) {
+    let mut lines = BufReader::new(from).lines();
+    while let Ok(Some(line)) = lines.next_line().await {
+        log.line(&name, &line);
+    }
+}

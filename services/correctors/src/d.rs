@@ -1,0 +1,281 @@
+//! The D-corrector: keeps both wheels at the distances that a drive asks for (paper, III.A).
+//!
+//! Hears a [`Task<Drive>`] and [`EncodersData`], says one [`Dwm`] at every beat. The paper's rule rings: its formula
+//! has a pole at -1 for every gain (model.md 4.5, erratum 11). This is the damped form of the model, with both poles
+//! at the parameter `pole`, around the speeds of the plan.
+//!
+//! *Time.* Due and real distances are compared at the robot's own clock: the state that was due at the stamp of a
+//! measurement against the state that was measured then. So the age of a measurement is no error. Commands do arrive
+//! later: the plan begins `lead` after the first beat, when the first command reaches the wheels, and every command is
+//! made for the time at which it will be obeyed. Between measurements the plan goes on by `seen.at`.
+//!
+//! *The end.* After the last movement the rest of the error is corrected until both wheels are within `tolerance` for
+//! `settle`, or `patience` is over. A dead zone of half the tolerance keeps the wheels from hunting to and fro, which
+//! destroyed the amplifiers of the authors (paper, III.D). The last command before `Done` is rest.
+//!
+//! *Failure.* The task fails with a reason when a wheel is `lost`, when no new measurement comes for `silence`, when
+//! the robot's clock goes back, and when the goal is missed grossly. Silence then makes the gate brake.
+
+use crate::due::Due;
+use axle_schema::contract::{Account, Bounds, Corrector, Params, Seen, Step};
+use axle_schema::refusal::within;
+use axle_schema::series::Datum as _;
+use axle_schema::{
+    Drive, Drivetrain, Dwm, EncodersData, Message as _, Metres, MetresPerSecond, Refusal, Seconds, Sides,
+    Task,
+};
+use serde::{Deserialize, Serialize};
+
+/// A stamp that goes back by more than this, in s, is of a robot that has restarted; by less, of an old measurement.
+const RESTART: f64 = 1.0;
+/// When patience is over, the goal counts as reached within this many tolerances, and as missed beyond.
+const NEAR: f64 = 5.0;
+
+/// Parameters of the D-corrector: `deploy/params/d-corrector.toml`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DParams {
+    /// Time from beat to beat, 0.01 to 0.5 s.
+    pub period: Seconds,
+    /// The double pole of the correction, 0 to 0.95: the share of an error that is left after a beat (model.md 4.5).
+    pub pole: f64,
+    /// How long after a measurement the wheels begin to obey the command that it led to, 0 to 1 s.
+    pub lead: Seconds,
+    /// How close to their distances both wheels must come, 0.0001 to 0.1 m.
+    pub tolerance: Metres,
+    /// For how long they must stay that close, 0 to 5 s.
+    pub settle: Seconds,
+    /// How long after the end of the plan the rest is corrected, 0 to 60 s.
+    pub patience: Seconds,
+    /// A wheel that is this far from where it should be does not follow, 0.01 to 10 m.
+    pub lost: Metres,
+    /// Without a new measurement for this long the task fails, 0.1 to 5 s.
+    pub silence: Seconds,
+    /// The robot: its wheel speed and acceleration limit every command.
+    pub robot: Drivetrain,
+}
+
+impl Default for DParams {
+    fn default() -> Self {
+        Self {
+            period: Seconds(0.05),
+            pole: 0.7,
+            lead: Seconds(0.06),
+            tolerance: Metres(0.002),
+            settle: Seconds(0.2),
+            patience: Seconds(3.0),
+            lost: Metres(0.3),
+            silence: Seconds(0.5),
+            robot: Drivetrain::default(),
+        }
+    }
+}
+
+impl Bounds for DParams {
+    fn check(&self) -> Result<(), Refusal> {
+        within("period in s", self.period.0, 0.01, 0.5)?;
+        within("pole", self.pole, 0.0, 0.95)?;
+        within("lead in s", self.lead.0, 0.0, 1.0)?;
+        within("tolerance in m", self.tolerance.0, 1e-4, 0.1)?;
+        within("settle in s", self.settle.0, 0.0, 5.0)?;
+        within("patience in s", self.patience.0, 0.0, 60.0)?;
+        within("lost in m", self.lost.0, 0.01, 10.0)?;
+        within("silence in s", self.silence.0, 0.1, 5.0)?;
+        self.robot.check()
+    }
+}
+
+impl Params for DParams {
+    const FILE: &'static str = include_str!("../../../deploy/params/d-corrector.toml");
+}
+
+/// The D-corrector at work on one drive.
+#[derive(Clone, Debug)]
+pub struct DCorrector {
+    params: DParams,
+    period: Seconds,
+    due: Due,
+    /// The measurement at the beginning of the task, from which distances and robot time count.
+    begin: EncodersData,
+    /// The robot time at which the plan begins; known from the first beat on.
+    zero: Option<Seconds>,
+    /// The newest measurement, and the beat at which it was first seen.
+    newest: EncodersData,
+    heard: Seconds,
+    /// The movement that was commanded last.
+    last: Dwm,
+    /// The stamp since which both wheels are within the tolerance of the goal.
+    calm: Option<Seconds>,
+}
+
+impl Corrector for DCorrector {
+    type Params = DParams;
+    type Plan = Drive;
+
+    fn period(params: &DParams) -> Seconds {
+        params.period
+    }
+
+    fn begin(params: &DParams, period: Seconds, task: Task<Drive>, seen: &Seen) -> Result<Self, Refusal> {
+        params.check()?;
+        within("period in s", period.0, 0.01, 0.5)?;
+        task.plan.check()?;
+        let due = Due::new(task.plan, &params.robot)?;
+        let Some(begin) = seen.encoders else {
+            let hint = "start the service robot or emulator, and look whether it says encoders";
+            return Err(Refusal::unavailable("the distances of the wheels", hint));
+        };
+        let last = Dwm::steady(due.speeds(0.0), Seconds::ZERO)?;
+        let (params, newest, heard) = (params.clone(), begin, seen.at);
+        Ok(Self { params, period, due, begin, zero: None, newest, heard, last, calm: None })
+    }
+
+    fn step(&mut self, seen: &Seen) -> Step {
+        // An empty plan has no goal to settle at.
+        if self.due.total() <= 0.0 {
+            return Step::Done;
+        }
+        match self.decide(seen) {
+            Ok(step) => step,
+            Err(refusal) => Step::Fail(refusal),
+        }
+    }
+
+    fn account(&self) -> Account {
+        let planned = self.planned();
+        let fraction =
+            if self.due.total() > 0.0 { (planned / self.due.total()).clamp(0.0, 1.0) } else { 1.0 };
+        Account {
+            stamp: self.newest.stamp,
+            elapsed: self.elapsed(),
+            fraction,
+            due: Some(self.due.distances(planned)),
+            real: Some(self.real()),
+        }
+    }
+}
+
+impl DCorrector {
+    fn decide(&mut self, seen: &Seen) -> Result<Step, Refusal> {
+        self.hear(seen)?;
+        // The robot time at which the command of this beat will be obeyed.
+        let obeyed = self.elapsed() + (seen.at - self.heard) + self.params.lead;
+        let zero = *self.zero.get_or_insert(obeyed);
+        let error = self.due.distances(self.planned()).zip(self.real(), |due, real| due - real);
+        self.check_lost(error)?;
+        if self.planned() < self.due.total() {
+            self.command(self.corrected((obeyed - zero).0, error))
+        } else {
+            self.finish(error)
+        }
+    }
+
+    /// Takes the newest measurement, or fails if there has been none for too long.
+    fn hear(&mut self, seen: &Seen) -> Result<(), Refusal> {
+        if let Some(encoders) = seen.encoders {
+            let since = encoders.stamp - self.newest.stamp;
+            if since.0 > 0.0 {
+                self.newest = encoders;
+                self.heard = seen.at;
+            } else if since.0 < -RESTART {
+                let (was, is) = (self.newest.stamp, encoders.stamp);
+                let why = format!("the robot restarted: its clock went back from {was:.3} to {is:.3}");
+                return Err(Refusal::Failed { why });
+            }
+        }
+        let age = seen.at - self.heard;
+        if age.0 <= self.params.silence.0 {
+            Ok(())
+        } else {
+            Err(Refusal::Failed {
+                why: format!("no measurement for {age:.2}, the robot or the link is silent"),
+            })
+        }
+    }
+
+    fn check_lost(&self, error: Sides<Metres>) -> Result<(), Refusal> {
+        for (side, error) in [("left", error.left), ("right", error.right)] {
+            // An error that is not a number is no better than a large one.
+            if !(0.0..=self.params.lost.0).contains(&error.0.abs()) {
+                let how = "is the drive enabled, and do the wheels turn freely?";
+                let why = format!(
+                    "the {side} wheel does not follow: it is {error:.3} from its due distance; {how}"
+                );
+                return Err(Refusal::Failed { why });
+            }
+        }
+        Ok(())
+    }
+
+    /// Time since the task began, by the robot's clock at the newest measurement.
+    fn elapsed(&self) -> Seconds {
+        self.newest.stamp - self.begin.stamp
+    }
+
+    /// The time of the plan at the newest measurement, s; negative before the first command reaches the wheels.
+    fn planned(&self) -> f64 {
+        self.zero.map_or(0.0, |zero| (self.elapsed() - zero).0)
+    }
+
+    fn real(&self) -> Sides<Metres> {
+        self.begin.span_to(&self.newest).sides()
+    }
+
+    /// The wheel speeds at the end of the next command, which is obeyed from the time `now` of the plan on, in s.
+    ///
+    /// model.md 4.5, with its symbols: e error, w speed beyond that of the plan, ΔT period, p pole.
+    /// w' = α e/ΔT - β w, α = (1-p)², β = (1-2p-p²)/2; w is that of the command as it was limited (anti-windup).
+    fn corrected(&self, now: f64, error: Sides<Metres>) -> Sides<MetresPerSecond> {
+        let p = self.params.pole;
+        let alpha = (1.0 - p) * (1.0 - p);
+        let beta = (1.0 - 2.0 * p - p * p) / 2.0;
+        let w = self.last.end().zip(self.due.speeds(now), |commanded, due| commanded - due);
+        let next = w.zip(error, |w, e| e / self.period * alpha - w * beta);
+        next.zip(self.due.speeds(now + self.period.0), |w, due| due + w)
+    }
+
+    /// What happens after the last movement of the plan, by the stamps: without measurements nothing settles.
+    fn finish(&mut self, error: Sides<Metres>) -> Result<Step, Refusal> {
+        let DParams { tolerance, settle, patience, .. } = self.params;
+        let worst = error.left.abs().max(error.right.abs());
+        let stamp = self.newest.stamp;
+        self.calm = if worst <= tolerance { self.calm.or(Some(stamp)) } else { None };
+        let settled = self.calm.is_some_and(|calm| stamp - calm >= settle);
+        let impatient = self.planned() - self.due.total() >= patience.0;
+        if impatient && worst > tolerance * NEAR {
+            let why = format!(
+                "the wheels are still {worst:.4} from their goal {patience} after the end of the plan"
+            );
+            return Err(Refusal::Failed { why });
+        }
+        if !(settled || impatient) {
+            let resting = error.zip(self.last.end(), |error, commanded| {
+                let stands = commanded.abs() <= MetresPerSecond::ZERO;
+                error.abs() <= tolerance * 0.5 || (stands && error.abs() <= tolerance)
+            });
+            let target = self.corrected(self.due.total(), error);
+            return self.command(
+                resting.zip(target, |rests, speed| if rests { MetresPerSecond::ZERO } else { speed }),
+            );
+        }
+        if self.last.peak_speed() <= MetresPerSecond::ZERO {
+            return Ok(Step::Done);
+        }
+        self.command(Sides::default())
+    }
+
+    /// The command towards `target`, within the limits of the robot.
+    fn command(&mut self, target: Sides<MetresPerSecond>) -> Result<Step, Refusal> {
+        let robot = &self.params.robot;
+        let most = robot.wheel_acceleration.0 * self.period.0;
+        let end = self.last.end().zip(target, |from, to| {
+            let to = to.0.clamp(-robot.wheel_speed.0, robot.wheel_speed.0);
+            MetresPerSecond(to.clamp(from.0 - most, from.0 + most))
+        });
+        self.last = Dwm::new(self.last.end(), end, self.period)?;
+        Ok(Step::Drive(self.last))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,93 @@
+//! The D-corrector, beat by beat; whole courses are in tests/closed_loop.rs.
+
+use super::*;
+use axle_schema::TaskId;
+
+fn task(dwms: Vec<Dwm>) -> Task<Drive> {
+    Task { id: TaskId(1), plan: Drive { dwms, ..Drive::default() } }
+}
+fn seen(at: f64, stamp: f64, left: f64, right: f64) -> Seen {
+    let encoders = EncodersData { stamp: Seconds(stamp), left: Metres(left), right: Metres(right) };
+    Seen { at: Seconds(at), encoders: Some(encoders), ..Seen::default() }
+}
+fn begin(params: &DParams, dwms: Vec<Dwm>) -> Result<DCorrector, Refusal> {
+    DCorrector::begin(params, params.period, task(dwms), &seen(0.0, 0.0, 0.0, 0.0))
+}
+fn fails(step: &Step, words: &str) {
+    let Step::Fail(refusal) = step else { panic!("{step:?} does not fail") };
+    assert!(refusal.to_string().contains(words), "{refusal} does not say {words:?}");
+}
+
+#[test]
+fn the_parameter_file_holds_the_defaults() {
+    let read: DParams = toml::from_str(DParams::FILE).expect("the file is valid");
+    assert_eq!(read, DParams::default());
+    let written = toml::Table::try_from(DParams::default()).expect("parameters are a table");
+    let table: toml::Table = toml::from_str(DParams::FILE).expect("the file is a table");
+    assert_eq!(table, written, "the file lists every field");
+    for pole in [-0.1, 1.0, f64::NAN] {
+        let wrong = begin(&DParams { pole, ..DParams::default() }, vec![]);
+        assert!(wrong.expect_err("no such pole").to_string().contains("pole"));
+    }
+}
+
+#[test]
+fn an_error_fades_with_the_double_pole() {
+    // The plant of model.md 4.5: e' = e - (w + w')ΔT/2, without delay. Then e(i+2) = 2p e(i+1) - p² e(i).
+    for pole in [0.0, 0.5, 0.7] {
+        let params = DParams { pole, lead: Seconds::ZERO, ..DParams::default() };
+        let mut corrector = begin(&params, vec![Dwm::rest(Seconds(100.0))]).expect("a plan");
+        let mut real = -0.002;
+        let mut errors = Vec::new();
+        for beat in 1..10 {
+            errors.push(-real);
+            let time = f64::from(beat) * 0.05;
+            let Step::Drive(dwm) = corrector.step(&seen(time, time, real, 0.0)) else { panic!("it goes on") };
+            real += dwm.encoders_span().left.0;
+            assert!(dwm.encoders_span().right.0.abs() < 1e-15, "the right wheel has no error");
+        }
+        for e in errors.windows(3) {
+            assert!((e[2] - 2.0 * pole * e[1] + pole * pole * e[0]).abs() < 1e-12, "pole {pole}: {errors:?}");
+        }
+    }
+}
+
+#[test]
+fn an_empty_plan_is_done_at_the_first_beat() {
+    let mut corrector = begin(&DParams::default(), vec![]).expect("nothing to drive is no fault");
+    assert_eq!(corrector.step(&seen(0.05, 0.05, 0.0, 0.0)), Step::Done);
+    assert!((corrector.account().fraction - 1.0).abs() < 1e-15);
+}
+
+#[test]
+fn a_task_without_measurements_is_refused_with_what_to_start() {
+    let nothing = DCorrector::begin(&DParams::default(), Seconds(0.05), task(vec![]), &Seen::default());
+    let words = nothing.expect_err("nothing is seen").to_string();
+    assert!(
+        words.contains("unavailable") && words.contains("start the service robot or emulator"),
+        "{words}"
+    );
+}
+
+#[test]
+fn silence_and_a_restart_fail_with_the_reason() {
+    let long = vec![Dwm::rest(Seconds(100.0))];
+    let mut corrector = begin(&DParams::default(), long.clone()).expect("a plan");
+    assert!(matches!(corrector.step(&seen(0.45, 0.0, 0.0, 0.0)), Step::Drive(_)));
+    fails(&corrector.step(&seen(0.55, 0.0, 0.0, 0.0)), "no measurement for 0.55 s");
+    fails(&corrector.step(&Seen { at: Seconds(f64::NAN), ..Seen::default() }), "no measurement");
+
+    let mut corrector = begin(&DParams::default(), long).expect("a plan");
+    assert!(matches!(corrector.step(&seen(0.05, 9.0, 0.0, 0.0)), Step::Drive(_)));
+    assert!(matches!(corrector.step(&seen(0.10, 8.9, 5.0, 5.0)), Step::Drive(_)), "an old one is not used");
+    fails(
+        &corrector.step(&seen(0.15, 0.1, 0.0, 0.0)),
+        "the robot restarted: its clock went back from 9.000 s to 0.100 s",
+    );
+}
+
+#[test]
+fn a_broken_measurement_is_a_wheel_that_is_lost() {
+    let mut corrector = begin(&DParams::default(), vec![Dwm::rest(Seconds(100.0))]).expect("a plan");
+    fails(&corrector.step(&seen(0.05, 0.05, 0.0, f64::NAN)), "the right wheel does not follow");
+}

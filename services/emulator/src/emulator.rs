@@ -1,0 +1,266 @@
+//! The body of the emulated robot, and its sensors.
+
+use crate::EmulatorParams;
+use crate::random::Random;
+use axle_schema::contract::Bounds as _;
+use axle_schema::dwm::MAX_WHEEL_SPEED;
+use axle_schema::{
+    Dwm, EncodersData, InertialData, Metres, MetresPerSecond, NavigatorData, Pose, Radians, RadiansPerSecond,
+    Refusal, Seconds, Sides, Twist,
+};
+
+/// A robot in software, which stands at first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Emulator {
+    params: EmulatorParams,
+    /// How much faster than asked each wheel drives: the same all its life.
+    gains: Sides<f64>,
+    gyro_bias: RadiansPerSecond,
+    jitter: Random,
+    gyro_noise: Random,
+    now: Seconds,
+    /// The setpoint of the wheels at `now`.
+    asked: Sides<MetresPerSecond>,
+    pose: Pose,
+    /// What the wheels have really covered.
+    distances: Sides<Metres>,
+    /// Time and true heading at the latest reading of the gyroscope.
+    gyro_read: (Seconds, Radians),
+}
+
+impl Emulator {
+    /// A robot with the imperfections that `params.seed` gives it, at time 0 of its clock.
+    ///
+    /// # Errors
+    /// Refuses parameters out of range.
+    pub fn new(params: EmulatorParams) -> Result<Self, Refusal> {
+        params.check()?;
+        let seed = params.seed;
+        // Each imperfection has its own stream: how often a sensor is read does not change how the robot drives.
+        let mut body = Random::new(seed, 0);
+        let mut gain = || 1.0 + params.motors.gain_deviation * body.normal().clamp(-3.0, 3.0);
+        let gains = Sides { left: gain(), right: gain() };
+        Ok(Self {
+            params,
+            gains,
+            gyro_bias: params.gyro.bias_deviation * body.normal(),
+            jitter: Random::new(seed, 1),
+            gyro_noise: Random::new(seed, 2),
+            now: Seconds::ZERO,
+            asked: Sides::default(),
+            pose: params.start,
+            distances: Sides::default(),
+            gyro_read: (Seconds::ZERO, params.start.heading),
+        })
+    }
+
+    /// Moves on to time `to`; the setpoints of the wheels go linearly from the last ones to `speeds`.
+    ///
+    /// A time that is not later changes nothing. A speed that is no number is taken for rest, and one beyond
+    /// 20 m/s for that: no wheel does more.
+    pub fn advance(&mut self, to: Seconds, speeds: Sides<MetresPerSecond>) {
+        let duration = to - self.now;
+        let speeds = speeds.map(possible);
+        let start = self.asked.zip(self.gains, |speed, gain| speed * gain);
+        let end = speeds.zip(self.gains, |speed, gain| speed * gain);
+        let later = duration.is_finite() && duration.0 > 0.0;
+        if !later {
+            return;
+        }
+        let jitter = start.zip(end, |v0, v1| self.jitters((v0 + v1) / 2.0 * duration) / duration);
+        let moved = Dwm::new(start.zip(jitter, |v, e| v + e), end.zip(jitter, |v, e| v + e), duration);
+        // Only an interval that is too short to be one makes a speed infinite; the next call covers it.
+        let Ok(moved) = moved else { return };
+        self.pose = moved.pose_at(self.pose, self.params.robot.track, duration);
+        self.distances = self.distances.zip(moved.encoders_span().sides(), |sum, span| sum + span);
+        (self.now, self.asked) = (to, speeds);
+    }
+
+    /// The distance that a wheel covers too much, by chance, over `distance`.
+    fn jitters(&mut self, distance: Metres) -> Metres {
+        self.params.motors.jitter * (distance.0.abs().sqrt() * self.jitter.normal())
+    }
+
+    /// The clock of the robot.
+    #[must_use]
+    pub const fn now(&self) -> Seconds {
+        self.now
+    }
+
+    /// What the encoders count since boot: the last whole tick of each wheel, less than a tick below the truth.
+    #[must_use]
+    pub fn encoders(&self) -> EncodersData {
+        let tick = self.params.encoders.tick;
+        let Sides { left, right } = self.distances.map(|distance| tick * (distance / tick).floor());
+        EncodersData { stamp: self.now, left, right }
+    }
+
+    /// What the gyroscope measures: the mean turn rate since its latest reading, with bias and noise. A mean and not
+    /// an instant, since real ones filter, and so that the sum of the readings is the turn.
+    pub fn inertial(&mut self) -> InertialData {
+        let (stamp, heading) = self.gyro_read;
+        let rate = if self.now.0 > stamp.0 {
+            (self.pose.heading - heading) / (self.now - stamp)
+        } else {
+            self.twist().omega
+        };
+        self.gyro_read = (self.now, self.pose.heading);
+        let noise = self.params.gyro.noise_deviation * self.gyro_noise.normal();
+        InertialData { stamp: self.now, gyro: rate + self.gyro_bias + noise, ax: None, ay: None }
+    }
+
+    /// Where the robot really is. The speeds leave the jitter out.
+    #[must_use]
+    pub fn truth(&self) -> NavigatorData {
+        NavigatorData { stamp: self.now, pose: self.pose, twist: Some(self.twist()), covariance: None }
+    }
+
+    fn twist(&self) -> Twist {
+        let Sides { left, right } = self.asked.zip(self.gains, |speed, gain| speed * gain);
+        let omega = RadiansPerSecond((right - left).0 / self.params.robot.track.get());
+        Twist { v: (left + right) / 2.0, omega }
+    }
+}
+
+/// The nearest speed that a wheel can be asked for.
+const fn possible(speed: MetresPerSecond) -> MetresPerSecond {
+    if speed.is_finite() {
+        MetresPerSecond(speed.0.clamp(-MAX_WHEEL_SPEED, MAX_WHEEL_SPEED))
+    } else {
+        MetresPerSecond::ZERO
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{GyroParams, MotorsParams};
+    use proptest::prelude::*;
+
+    fn speeds(left: f64, right: f64) -> Sides<MetresPerSecond> {
+        Sides::new(MetresPerSecond(left), MetresPerSecond(right))
+    }
+
+    /// A robot that does as it is told and knows what it does.
+    fn perfect() -> Emulator {
+        let params = EmulatorParams {
+            motors: MotorsParams { gain_deviation: 0.0, jitter: Metres::ZERO },
+            gyro: GyroParams {
+                bias_deviation: RadiansPerSecond::ZERO,
+                noise_deviation: RadiansPerSecond::ZERO,
+            },
+            ..EmulatorParams::default()
+        };
+        Emulator::new(params).expect("a robot")
+    }
+
+    #[test]
+    fn without_noise_it_drives_what_it_is_told() {
+        let mut robot = perfect();
+        // From 0 to 0.5 m/s in 2 s, straight: 0.5 m.
+        robot.advance(Seconds(2.0), speeds(0.5, 0.5));
+        let truth = robot.truth();
+        assert!((truth.pose.x.0 - 0.5).abs() < 1e-12 && truth.pose.y.0.abs() < 1e-12, "{truth:?}");
+        assert_eq!(truth.twist.map(|twist| twist.v), Some(MetresPerSecond(0.5)));
+        // Then the right wheel comes to 1.1 m/s in 1 s: it covers 0.3 m more, with a track of 0.3 m: 1 rad.
+        robot.inertial();
+        robot.advance(Seconds(3.0), speeds(0.5, 1.1));
+        assert!((robot.truth().pose.heading.0 - 1.0).abs() < 1e-12);
+        assert!((robot.inertial().gyro.0 - 1.0).abs() < 1e-12, "the mean turn rate");
+        assert!((robot.inertial().gyro.0 - 2.0).abs() < 1e-12, "the turn rate of an instant");
+    }
+
+    #[test]
+    fn what_makes_no_sense_moves_nothing() {
+        let mut robot = perfect();
+        robot.advance(Seconds(1.0), speeds(0.5, 0.5));
+        let before = robot.clone();
+        for to in [1.0, 0.5, -1.0, f64::NAN, f64::INFINITY] {
+            robot.advance(Seconds(to), speeds(0.1, 0.2));
+            assert_eq!(robot, before, "time {to}");
+        }
+        robot.advance(Seconds(2.0), speeds(f64::NAN, f64::INFINITY));
+        let twist = robot.truth().twist.expect("a twist");
+        assert_eq!((twist.v, twist.omega), (MetresPerSecond::ZERO, RadiansPerSecond::ZERO));
+    }
+
+    #[test]
+    fn a_standing_robot_stands() {
+        let mut robot = Emulator::new(EmulatorParams { seed: 3, ..EmulatorParams::default() }).expect("a robot");
+        for beat in 1..1000 {
+            robot.advance(Seconds(f64::from(beat) * 0.005), Sides::default());
+        }
+        assert_eq!((robot.truth().pose, robot.encoders().left), (Pose::default(), Metres::ZERO));
+        assert_ne!(robot.inertial().gyro, RadiansPerSecond::ZERO, "but its gyroscope says otherwise");
+    }
+
+    #[test]
+    fn how_often_sensors_are_read_does_not_change_how_it_drives() {
+        let mut read = Emulator::new(EmulatorParams { seed: 3, ..EmulatorParams::default() }).expect("a robot");
+        let mut unread = read.clone();
+        for beat in 1..100 {
+            for robot in [&mut read, &mut unread] {
+                robot.advance(Seconds(f64::from(beat) * 0.005), speeds(0.3, 0.4));
+            }
+            read.inertial();
+        }
+        assert_eq!(read.truth(), unread.truth());
+    }
+
+    /// Setpoints at growing times.
+    fn drive() -> impl Strategy<Value = Vec<(f64, f64, f64)>> {
+        prop::collection::vec((0.005..1.0, -1.0..1.0, -1.0..1.0), 1..20)
+    }
+
+    proptest! {
+        #[test]
+        fn slices_of_time_add_up(drive in drive(), slices in 1_u32..8) {
+            let (mut whole, mut sliced) = (perfect(), perfect());
+            let (mut time, mut last) = (0.0, speeds(0.0, 0.0));
+            for (span, left, right) in drive {
+                let next = speeds(left, right);
+                for slice in 1..=slices {
+                    let share = f64::from(slice) / f64::from(slices);
+                    sliced.advance(Seconds(time + span * share), last.zip(next, |v0, v1| v0 + (v1 - v0) * share));
+                }
+                time += span;
+                whole.advance(Seconds(time), next);
+                last = next;
+            }
+            let (a, b) = (whole.truth().pose, sliced.truth().pose);
+            prop_assert!(a.distance(b).0 < 1e-12 && (a.heading - b.heading).abs().0 < 1e-12, "{a:?} {b:?}");
+        }
+
+        #[test]
+        fn the_same_seed_gives_the_same_bits(drive in drive(), seed in any::<u64>()) {
+            let run = || {
+                let mut robot = Emulator::new(EmulatorParams { seed, ..EmulatorParams::default() }).expect("a robot");
+                let mut time = 0.0;
+                let seen: Vec<_> = drive
+                    .iter()
+                    .map(|&(span, left, right)| {
+                        time += span;
+                        robot.advance(Seconds(time), speeds(left, right));
+                        (robot.truth(), robot.encoders(), robot.inertial())
+                    })
+                    .collect();
+                format!("{seen:?}")
+            };
+            prop_assert_eq!(run(), run());
+        }
+
+        #[test]
+        fn encoders_are_never_off_by_more_than_a_tick(drive in drive(), seed in any::<u64>()) {
+            let mut robot = Emulator::new(EmulatorParams { seed, ..EmulatorParams::default() }).expect("a robot");
+            let mut time = 0.0;
+            for (span, left, right) in drive {
+                time += span;
+                robot.advance(Seconds(time), speeds(left, right));
+                let counted = robot.encoders().sides().zip(robot.distances, |count, truth| (truth - count).0);
+                for missing in counted.both() {
+                    prop_assert!((-1e-12..=0.0005 + 1e-12).contains(&missing), "{missing}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,260 @@
+//! What the gate remembers, and its beat. Who may move the wheels is in `authority`, which commands are obeyed in
+//! `check`, what the gate says of itself in `account`.
+
+use crate::GateParams;
+use crate::wheels::{at_rest, braked, toward};
+use axle_schema::command::{BrakeCause, Class, Reject};
+use axle_schema::{Boot, Drivetrain, Dwm, MetresPerSecond, Refusal, Seconds, Sides, StopId};
+use std::collections::BTreeMap;
+
+/// The longest time from beat to beat that a change of speed is computed for. After a longer pause of the process the
+/// wheels go on from where they were told to be, instead of catching up with a jump.
+pub const MAX_BEAT: Seconds = Seconds(0.05);
+
+/// How many commands the gate reads from one beat to the next; what comes beyond is counted unread, so that a flood
+/// costs bounded time. At beats of 5 ms it is 100 000 in a second, twice the flood of the fault matrix (row 27).
+pub const COMMANDS_PER_BEAT: u32 = 512;
+
+/// The gate: a state machine without a clock, a thread or a wire.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gate {
+    pub(crate) params: GateParams,
+    /// The largest speed of a wheel.
+    pub(crate) wheel_speed: MetresPerSecond,
+    pub(crate) boot: Boot,
+    /// The latest time that the gate has heard of.
+    now: Seconds,
+    /// The time of the latest beat.
+    beaten: Option<Seconds>,
+    pub(crate) permit: Permit,
+    /// The latest AllStop, in force or not.
+    pub(crate) stop: Option<StopId>,
+    /// Number of the latest grant.
+    pub(crate) epoch: u32,
+    /// The sequence number of the latest command that was obeyed in this epoch.
+    pub(crate) seq: Option<u32>,
+    pub(crate) held: Option<Held>,
+    pub(crate) course: Option<Course>,
+    /// The setpoint of the latest beat.
+    pub(crate) wheels: Sides<MetresPerSecond>,
+    pub(crate) cause: Option<BrakeCause>,
+    pub(crate) accepted: u64,
+    pub(crate) rejected: BTreeMap<Reject, u64>,
+    /// Commands since the latest beat.
+    pub(crate) arrived: u32,
+}
+
+/// Whether anybody may move the wheels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Permit {
+    /// Who holds the lease may.
+    Enabled,
+    /// Nobody may, since the boot or because the process disabled the drive.
+    Disabled,
+    /// Nobody may until an enable quotes the latest AllStop.
+    Stopped,
+}
+
+/// A lease in force.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Held {
+    pub(crate) holder: String,
+    pub(crate) class: Class,
+    pub(crate) silence_stop: Seconds,
+    /// The grant, or the latest command that was obeyed.
+    pub(crate) heard: Seconds,
+}
+
+/// The movement that the wheels obey; it belongs to the holder of the current epoch.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Course {
+    pub(crate) dwm: Dwm,
+    /// When it was accepted, and so began.
+    pub(crate) since: Seconds,
+    /// How much of it counts: its duration, or less when its sender said so.
+    pub(crate) lasts: Seconds,
+}
+
+impl Gate {
+    /// The gate of a robot after a boot, with standing wheels and without a holder.
+    ///
+    /// `latch` is the AllStop that was in force when the process ended ([`Gate::latch`]); it is in force again.
+    ///
+    /// # Errors
+    /// Refuses parameters out of range, or that would refuse what the planners of this robot ask for.
+    pub fn new(
+        params: GateParams,
+        robot: &Drivetrain,
+        boot: Boot,
+        latch: Option<StopId>,
+    ) -> Result<Self, Refusal> {
+        params.fits(robot)?;
+        let permit = match latch {
+            Some(_) => Permit::Stopped,
+            None if params.starts_enabled => Permit::Enabled,
+            None => Permit::Disabled,
+        };
+        Ok(Self {
+            params,
+            wheel_speed: robot.wheel_speed,
+            boot,
+            now: Seconds::ZERO,
+            beaten: None,
+            permit,
+            stop: latch,
+            epoch: 0,
+            seq: None,
+            held: None,
+            course: None,
+            wheels: Sides::default(),
+            cause: None,
+            accepted: 0,
+            rejected: BTreeMap::new(),
+            arrived: 0,
+        })
+    }
+
+    /// One beat: the setpoint of the wheels for this instant. Beats come 5 to 20 ms apart, also when nothing moves.
+    pub fn beat(&mut self, now: Seconds) -> Sides<MetresPerSecond> {
+        let now = self.settle(now);
+        let span = (now - self.beaten.unwrap_or(now)).max(Seconds::ZERO).min(MAX_BEAT);
+        self.beaten = Some(now);
+        self.arrived = 0;
+        // The end of a movement is judged here and not at every event, so that a next command that comes in time for
+        // the beat finds the last one still running.
+        if self.course.as_ref().is_some_and(|course| course.is_over(now, self.params.grace)) {
+            self.course = None;
+            if !at_rest(self.wheels) {
+                self.cause = Some(BrakeCause::Expired);
+            }
+        }
+        self.wheels = match &self.course {
+            Some(course) => toward(self.wheels, course.speeds_at(now), self.params.a_max * span),
+            None => braked(self.wheels, self.params.a_stop * span),
+        };
+        self.wheels
+    }
+
+    /// Takes the time of an event and ends what has run out by then; returns the time that the gate goes by.
+    ///
+    /// A clock that goes backwards stands still for the gate, and one that is no number runs: so timers run out.
+    pub(crate) fn settle(&mut self, now: Seconds) -> Seconds {
+        self.now = if now.is_finite() { self.now.max(now) } else { self.now + MAX_BEAT };
+        let alive = |held: &Held| self.now < held.heard + held.silence_stop;
+        if self.held.as_ref().is_some_and(|held| !alive(held)) {
+            self.end_lease(BrakeCause::Silence);
+        }
+        self.now
+    }
+
+    /// Ends the lease and the movement that it gave; the beats brake from now on.
+    pub(crate) fn end_lease(&mut self, cause: BrakeCause) {
+        self.held = None;
+        self.course = None;
+        self.cause = Some(cause);
+    }
+}
+
+impl Course {
+    /// Whether the movement, and the time that its last speed is held, are over.
+    fn is_over(&self, now: Seconds, grace: Seconds) -> bool {
+        let running = now < self.since + self.lasts + grace;
+        !running
+    }
+    /// The speeds that it asks for; the last ones of what counts are held.
+    fn speeds_at(&self, now: Seconds) -> Sides<MetresPerSecond> {
+        self.dwm.speeds_at((now - self.since).min(self.lasts))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rig::{Rig, drive};
+    use axle_schema::command::Motion;
+
+    #[test]
+    fn a_movement_runs_from_its_acceptance_and_brakes_when_no_next_one_comes() {
+        let mut rig = Rig::enabled();
+        let lease = rig.lease("a", Class::Corrector);
+        rig.command(&lease, drive(0.0, 0.16, 0.08)).expect("obeyed");
+        // 2 m/s² for 80 ms, below the 2.5 m/s² of the gate: the setpoint is the movement itself.
+        let speeds = rig.beats(0.04);
+        assert!((speeds.left.0 - 0.08).abs() < 1e-9, "half of the way to 0.16 m/s: {speeds:?}");
+        let speeds = rig.beats(0.085);
+        assert!((speeds.left.0 - 0.16).abs() < 1e-9, "the end speed is held for 50 ms: {speeds:?}");
+        assert_eq!(rig.gate.motion(), Motion::Driving);
+        rig.beats(0.01);
+        assert_eq!(
+            (rig.gate.motion(), rig.gate.state(rig.now).cause),
+            (Motion::Braking, Some(BrakeCause::Expired))
+        );
+        // 0.16 m/s at 2 m/s² takes 80 ms.
+        assert_eq!(rig.beats(0.085), Sides::default());
+        assert_eq!(rig.gate.motion(), Motion::Standing);
+    }
+
+    #[test]
+    fn a_sender_can_shorten_a_movement() {
+        let mut rig = Rig::enabled();
+        let lease = rig.lease("a", Class::Corrector);
+        let mut command = rig.next(&lease, drive(0.0, 0.2, 0.1));
+        command.ttl_ms = 20;
+        rig.gate.obey(rig.now, &command).expect("obeyed");
+        // A fifth of the way to 0.2 m/s, then held for 50 ms, then braked.
+        assert!((rig.beats(0.06).left.0 - 0.04).abs() < 1e-9);
+        rig.beats(0.015);
+        assert_eq!(rig.gate.motion(), Motion::Braking);
+    }
+
+    #[test]
+    fn silence_ends_the_lease_even_of_a_long_movement() {
+        let mut rig = Rig::enabled();
+        let lease = rig.lease("a", Class::Corrector);
+        rig.command(&lease, drive(0.5, 0.5, 10.0)).expect("obeyed");
+        rig.beats(0.145);
+        assert_eq!(rig.gate.motion(), Motion::Driving);
+        rig.beats(0.01);
+        let state = rig.gate.state(rig.now);
+        assert_eq!(
+            (state.motion, state.cause, state.holder),
+            (Motion::Braking, Some(BrakeCause::Silence), None)
+        );
+        assert_eq!(rig.command(&lease, drive(0.0, 0.2, 1.0)), Err(Reject::Fenced));
+    }
+
+    #[test]
+    fn a_command_during_braking_resumes_smoothly() {
+        let mut rig = Rig::enabled();
+        let lease = rig.lease("a", Class::Corrector);
+        rig.command(&lease, drive(0.2, 0.2, 0.05)).expect("obeyed");
+        let slow = rig.beats(0.12).left.0;
+        assert!(slow > 0.05 && slow < 0.2, "braking: {slow}");
+        rig.command(&lease, drive(0.2, 0.2, 0.05)).expect("obeyed");
+        let next = rig.beats(0.005).left.0;
+        assert!((next - slow - 2.5 * 0.005).abs() < 1e-9, "from {slow} up by 12.5 mm/s: {next}");
+    }
+
+    #[test]
+    fn after_a_pause_of_the_process_the_wheels_do_not_jump() {
+        let mut rig = Rig::enabled();
+        let lease = rig.lease("a", Class::Corrector);
+        rig.gate.beat(rig.now);
+        rig.now += Seconds(0.1);
+        rig.command(&lease, drive(1.0, 1.0, 5.0)).expect("obeyed");
+        let speeds = rig.gate.beat(rig.now);
+        assert!((speeds.left.0 - 2.5 * MAX_BEAT.0).abs() < 1e-12, "as after 50 ms: {speeds:?}");
+    }
+
+    #[test]
+    fn a_clock_that_is_no_number_brakes() {
+        let mut rig = Rig::enabled();
+        let lease = rig.lease("a", Class::Corrector);
+        rig.command(&lease, drive(0.5, 0.5, 5.0)).expect("obeyed");
+        rig.beats(0.1);
+        for _ in 0..10 {
+            rig.gate.beat(Seconds(f64::NAN));
+        }
+        assert_eq!(rig.gate.motion(), Motion::Standing);
+    }
+}
