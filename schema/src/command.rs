@@ -128,7 +128,7 @@ impl Message for AllStop {
 #[serde(deny_unknown_fields)]
 pub struct Enable {
     /// The id of the latest stop that the gate's state shows; left out when there was none.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stop: Option<StopId>,
     /// From the gate's state.
     pub boot: Boot,

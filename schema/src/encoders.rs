@@ -2,6 +2,7 @@
 
 use crate::codec::Message;
 use crate::navigator::NavigatorSpan;
+use crate::refusal::within;
 use crate::{Dwm, Metres, Radians, Refusal, Seconds, Sides, Track, motion};
 use serde::{Deserialize, Serialize};
 
@@ -79,6 +80,13 @@ impl EncodersSpan {
 impl Message for EncodersData {
     const NAME: &'static str = "EncodersData";
     const LIMIT: usize = 256;
+
+    fn check(&self) -> Result<(), Refusal> {
+        // No wheel turns a thousand million metres, and no robot runs for thirty years.
+        within("stamp in s", self.stamp.0, -1e9, 1e9)?;
+        within("distance of the left wheel in m", self.left.0, -1e9, 1e9)?;
+        within("distance of the right wheel in m", self.right.0, -1e9, 1e9)
+    }
 }
 impl Message for EncodersSpan {
     const NAME: &'static str = "EncodersSpan";

@@ -41,6 +41,16 @@ impl Pose {
         let (dx, dy) = (self.x.0 - basis.x.0, self.y.0 - basis.y.0);
         Self::new(cos * dx + sin * dy, cos * dy - sin * dx, self.heading.0 - basis.heading.0)
     }
+    /// Refuses a pose that no robot of this earth has.
+    ///
+    /// # Errors
+    /// Names the coordinate.
+    pub fn check(self) -> Result<(), Refusal> {
+        for (what, value) in [("x in m", self.x.0), ("y in m", self.y.0), ("heading in rad", self.heading.0)] {
+            crate::refusal::within(what, value, -1e9, 1e9)?;
+        }
+        Ok(())
+    }
     /// Straight distance between the positions.
     #[must_use]
     pub fn distance(self, other: Self) -> Metres {
@@ -90,6 +100,7 @@ impl Message for NavigatorData {
     const LIMIT: usize = 1024;
 
     fn check(&self) -> Result<(), Refusal> {
+        self.pose.check()?;
         let Some(Numbers(covariance)) = self.covariance else { return Ok(()) };
         for (name, index) in [("x", 0), ("y", 4), ("heading", 8)] {
             crate::refusal::within(&format!("variance of {name}"), covariance[index], 0.0, f64::MAX)?;

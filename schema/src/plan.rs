@@ -3,6 +3,7 @@
 use crate::codec::Message;
 use crate::contract::Bounds as _;
 use crate::drivetrain::Drivetrain;
+use crate::dwm::MAX_WHEEL_SPEED;
 use crate::refusal::within;
 use crate::way::MAX_POINTS;
 use crate::{Dwm, Geometry, Metres, MetresPerSecond, Pose, Refusal, Seconds, Sides, WayTask};
@@ -82,7 +83,7 @@ fn check_legs(legs: &[Leg]) -> Result<(), Refusal> {
     for leg in legs {
         leg.geometry.check()?;
         if let Some(speed) = leg.speed {
-            within("speed of a leg", speed.0, 1e-3, crate::dwm::MAX_WHEEL_SPEED)?;
+            within("speed of a leg", speed.0, 1e-3, MAX_WHEEL_SPEED)?;
         }
     }
     Ok(())
@@ -101,6 +102,7 @@ impl Message for PlanAsk {
     const NAME: &'static str = "PlanAsk";
     const LIMIT: usize = 256 * 1024;
     fn check(&self) -> Result<(), Refusal> {
+        self.start.map_or(Ok(()), Pose::check)?;
         self.way.check()
     }
 }
@@ -117,6 +119,9 @@ impl Message for DriveAsk {
     const LIMIT: usize = 1024 * 1024;
     fn check(&self) -> Result<(), Refusal> {
         self.robot.map_or(Ok(()), |robot| robot.check())?;
+        for speed in self.speeds.map_or([MetresPerSecond::ZERO; 2], Sides::both) {
+            within("wheel speed at the beginning in m/s", speed.0, -MAX_WHEEL_SPEED, MAX_WHEEL_SPEED)?;
+        }
         check_legs(&self.legs)
     }
 }
@@ -125,6 +130,9 @@ impl Message for Drive {
     const LIMIT: usize = 4 * 1024 * 1024;
     fn check(&self) -> Result<(), Refusal> {
         limit_list("movements of a drive", self.dwms.len(), MAX_DWMS)?;
+        for dwm in &self.dwms {
+            within("wheel speed of a movement in m/s", dwm.peak_speed().0, 0.0, MAX_WHEEL_SPEED)?;
+        }
         limit_list("legs of a drive", self.counts.len(), MAX_LEGS)
     }
 }

@@ -153,6 +153,10 @@ pub fn within(what: &str, value: f64, low: f64, high: f64) -> Result<(), Refusal
     if (low..=high).contains(&value) {
         Ok(())
     } else {
-        Err(Refusal::out_of_range(what, value, format!("{low} to {high}")))
+        // Numbers with hundreds of digits tell nobody anything.
+        let short = |number: f64| {
+            if number.abs() < 1e7 { number.to_string() } else { format!("{number:e}") }
+        };
+        Err(Refusal::out_of_range(what, short(value), format!("{} to {}", short(low), short(high))))
     }
 }

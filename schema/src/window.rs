@@ -49,6 +49,8 @@ impl Message for Window {
     fn check(&self) -> Result<(), Refusal> {
         limit_list("encoders of a window", self.encoders.len(), MAX_WINDOW)?;
         limit_list("inertial data of a window", self.inertial.len(), MAX_WINDOW)?;
-        limit_list("fixes of a window", self.fixes.len(), MAX_WINDOW)
+        limit_list("fixes of a window", self.fixes.len(), MAX_WINDOW)?;
+        self.encoders.iter().try_for_each(Message::check)?;
+        self.fixes.iter().try_for_each(Message::check)
     }
 }

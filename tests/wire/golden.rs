@@ -1,6 +1,6 @@
 //! The bytes that Axle writes, as committed in `tests/golden`, and what CDDL says of them.
 //!
-//! `AXLE_WRITE_GOLDEN=1 cargo test -p axle-tests golden` rewrites the files; a changed file is a changed wire.
+//! `AXLE_WRITE_GOLDEN=1 cargo test -p axle --test whole golden` rewrites the files; a changed file is a changed wire.
 
 use super::examples;
 use axle_schema::codec::schema_of;
@@ -11,6 +11,8 @@ use std::path::{Path, PathBuf};
 
 /// What a decoder of one type makes of bytes: the bytes that it would write itself.
 pub(super) type Again = fn(&[u8]) -> Result<Vec<u8>, Refusal>;
+
+type Same = Box<dyn Fn(&[u8]) -> Result<bool, Refusal>>;
 
 /// One example of one message.
 pub(super) struct Golden {
@@ -25,7 +27,7 @@ pub(super) struct Golden {
     /// Decodes bytes as this type and encodes the result.
     pub(super) again: Again,
     /// Whether bytes decode to the example itself.
-    same: Box<dyn Fn(&[u8]) -> Result<bool, Refusal>>,
+    same: Same,
 }
 
 impl Golden {
@@ -51,7 +53,7 @@ fn again<M: Message + PartialEq + Debug>(bytes: &[u8]) -> Result<Vec<u8>, Refusa
 }
 
 fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("golden")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden")
 }
 
 /// Checks bytes against the rule `name` of the shipped CDDL.
@@ -74,7 +76,7 @@ fn golden_files_hold_the_very_bytes_that_are_written() {
             std::fs::write(folder().join(&cbor), &golden.bytes).expect("the file can be written");
             std::fs::write(folder().join(&json), &golden.json).expect("the file can be written");
         }
-        let advice = "if the change is meant: AXLE_WRITE_GOLDEN=1 cargo test -p axle-tests golden";
+        let advice = "if the change is meant: AXLE_WRITE_GOLDEN=1 cargo test -p axle --test whole golden";
         let bytes =
             std::fs::read(folder().join(&cbor)).unwrap_or_else(|why| panic!("{cbor}: {why}; {advice}"));
         assert_eq!(bytes, golden.bytes, "{cbor} is no longer what is written; {advice}");
@@ -142,7 +144,7 @@ fn the_cddl_refuses_what_the_codec_refuses() {
 
 /// The names of all messages, read from the source text of the schema crate.
 fn names_in_the_source() -> BTreeSet<String> {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../schema/src");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../schema/src");
     let mut names = BTreeSet::new();
     for entry in std::fs::read_dir(source).expect("the schema crate is beside the tests") {
         let text = std::fs::read_to_string(entry.expect("an entry").path()).unwrap_or_default();

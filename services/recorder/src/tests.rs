@@ -83,7 +83,7 @@ fn params_outside_their_ranges_are_refused_by_name() {
 fn what_is_written_comes_back() {
     let folder = Folder::new();
     let path = folder.file("a.mcap");
-    let dwm = encode(&Dwm::rest(axle_schema::Seconds(0.5))).expect("a dwm");
+    let dwm = encode(&Dwm::rest(Seconds(0.5))).expect("a dwm");
     let attachment = meta((1 << 40) + 5);
     let mut recorder = recorder(&path);
     recorder.write(sample(&dwm, Some(&attachment), NOON + 1)).expect("room");
@@ -382,7 +382,7 @@ fn a_disk_that_fills_up_is_an_error_by_the_next_flush_and_ever_after() {
     // The file is replaced below the recorder: what comes after the header meets a full disk.
     let folder = Folder::new();
     let mut recorder = recorder(&folder.file("a.mcap"));
-    recorder.swap_for_a_full_disk();
+    recorder.swap_for_a_full_disk().expect("a full disk");
     let written = recorder.write(sample(b"x", None, NOON)).and_then(|()| recorder.flush(NOON + SECOND));
     let fault = written.expect_err("the disk is full");
     assert!(fault.is_final() && matches!(fault, RecordError::Write(_)), "{fault}");

@@ -365,10 +365,10 @@ impl Recorder {
 
     /// Puts a full disk in the place of the file.
     #[cfg(all(test, target_os = "linux"))]
-    pub(crate) fn swap_for_a_full_disk(&mut self) {
-        let full = File::options().write(true).open("/dev/full").expect("a full disk");
-        self.writer = Some(writer(full.try_clone().expect("a full disk")).expect("a header in memory"));
-        self.file = full;
+    pub(crate) fn swap_for_a_full_disk(&mut self) -> std::io::Result<()> {
+        self.file = File::options().write(true).open("/dev/full")?;
+        self.writer = Some(writer(self.file.try_clone()?).map_err(std::io::Error::other)?);
+        Ok(())
     }
 
     /// Lets the writer do something; its first failure ends the recording, since nobody knows what reached the file.

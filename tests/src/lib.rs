@@ -1,1 +1,0 @@
-//! Whole-system proofs of Axle.
