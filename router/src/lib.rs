@@ -102,7 +102,10 @@ impl Router {
             ("mode", "\"router\"".to_owned()),
             ("listen/endpoints", list(&settings.listen)),
             ("connect/endpoints", list(&settings.connect)),
-            ("connect/retry", "{ period_init_ms: 100, period_max_ms: 1000, period_increase_factor: 2 }".to_owned()),
+            (
+                "connect/retry",
+                "{ period_init_ms: 100, period_max_ms: 1000, period_increase_factor: 2 }".to_owned(),
+            ),
             // Nobody is looked for by scouting, so nothing has to be waited for.
             ("scouting/delay", "0".to_owned()),
         ];

@@ -139,7 +139,8 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Traced<T> {
                 fault.into_inner()
             } else {
                 // A key that cannot be read has no name.
-                let path = path.strip_suffix('?').map_or_else(|| path.clone(), |above| format!("{above}<key>"));
+                let path =
+                    path.strip_suffix('?').map_or_else(|| path.clone(), |above| format!("{above}<key>"));
                 D::Error::custom(format_args!("{path}: {}", reason(&fault.into_inner())))
             }
         })

@@ -107,7 +107,9 @@ impl Dwm {
         end: Sides<MetresPerSecond>,
         duration: Seconds,
     ) -> Result<Self, Refusal> {
-        for (name, speed) in [("v0l", start.left), ("v0r", start.right), ("v1l", end.left), ("v1r", end.right)] {
+        for (name, speed) in
+            [("v0l", start.left), ("v0r", start.right), ("v1l", end.left), ("v1r", end.right)]
+        {
             if !speed.is_finite() {
                 return Err(Refusal::out_of_range(format!("wheel speed {name}"), speed, "finite numbers"));
             }

@@ -66,7 +66,11 @@ impl EncodersSpan {
         } else if self.left == Metres::ZERO && self.right == Metres::ZERO {
             Ok(Dwm::rest(Seconds::ZERO))
         } else {
-            Err(Refusal::out_of_range("duration of an encoder span that moves", self.duration, "more than 0 s"))
+            Err(Refusal::out_of_range(
+                "duration of an encoder span that moves",
+                self.duration,
+                "more than 0 s",
+            ))
         }
     }
     /// The displacement along the arc that constant wheel speeds drive: exact for them (model.md, 1.3).

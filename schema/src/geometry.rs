@@ -34,7 +34,11 @@ impl Geometry {
     /// Refuses a radius of 0, along which no distance can be driven, and numbers that are not finite.
     pub fn arc_by_distance(radius: Metres, distance: Metres) -> Result<Self, Refusal> {
         if !(radius.is_finite() && radius.0.abs() > 0.0) {
-            return Err(Refusal::out_of_range("radius of an arc given by distance", radius, "finite, not 0 m"));
+            return Err(Refusal::out_of_range(
+                "radius of an arc given by distance",
+                radius,
+                "finite, not 0 m",
+            ));
         }
         if !distance.is_finite() {
             return Err(Refusal::out_of_range("distance of an arc", distance, "finite numbers"));

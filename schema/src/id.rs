@@ -27,7 +27,11 @@ impl RobotId {
             return Err(Refusal::out_of_range("robot id", format_args!("{shown:?}"), shape));
         }
         if let Some(wrong) = name.chars().find(|c| !matches!(c, 'a'..='z' | '0'..='9' | '-')) {
-            return Err(Refusal::out_of_range("robot id", format_args!("{shown:?} (it has {wrong:?})"), shape));
+            return Err(Refusal::out_of_range(
+                "robot id",
+                format_args!("{shown:?} (it has {wrong:?})"),
+                shape,
+            ));
         }
         Ok(Self(name.to_owned()))
     }

@@ -294,8 +294,11 @@ pub const TABLE: &[Entry] = &[
     POSE.entry("Where the robot believes to be."),
 ];
 
-/// A message type that may stand in an encoding, beside those of [`TABLE`].
-const MORE_TYPES: &[(fn() -> String, ToJson)] = &[
+/// The name of a schema, and how to show what it describes.
+type Reader = (fn() -> String, ToJson);
+
+/// Message types that may stand in an encoding, beside those of [`TABLE`].
+const MORE_TYPES: &[Reader] = &[
     (schema_of::<Dwm>, json::<Dwm>),
     (schema_of::<Plan>, json::<Plan>),
     (schema_of::<Drive>, json::<Drive>),
@@ -349,7 +352,8 @@ pub fn to_json(key: &str, encoding: &str, bytes: &[u8]) -> Result<serde_json::Va
         None => find(key).map(|entry| entry.json),
     };
     let Some(reader) = reader else {
-        let got = named.map_or_else(|| key.chars().take(120).collect(), |schema| schema.chars().take(120).collect());
+        let got = named
+            .map_or_else(|| key.chars().take(120).collect(), |schema| schema.chars().take(120).collect());
         return Err(Refusal::Unknown { what: "message type".into(), got, known: "see docs/keys.md".into() });
     };
     reader(bytes)
@@ -410,8 +414,11 @@ impl Presence {
 
 /// A host name made fit for a chunk of a key.
 fn chunk(name: &str) -> String {
-    let mut chunk: String =
-        name.chars().take(64).map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '-' }).collect();
+    let mut chunk: String = name
+        .chars()
+        .take(64)
+        .map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '-' })
+        .collect();
     if chunk.is_empty() {
         chunk.push_str("unknown");
     }
@@ -435,7 +442,10 @@ mod tests {
         assert_eq!(PLAN.of_every_robot().as_str(), "axle/*/pathfinder/plan");
         assert_eq!(PLAN.of(None).as_str(), "axle/all/pathfinder/plan");
         assert_eq!(find("axle/r1/robot/encoders").expect("known").carries(), "axle.EncodersData.v1");
-        assert_eq!(find("axle/r1/d-corrector/progress").expect("known").carries(), "axle.CorrectorProgress.v1");
+        assert_eq!(
+            find("axle/r1/d-corrector/progress").expect("known").carries(),
+            "axle.CorrectorProgress.v1"
+        );
         assert!(find("axle/r1/robot/encoders/more").is_none());
         assert!(find("other/r1/robot/encoders").is_none());
     }

@@ -46,7 +46,8 @@ impl Pose {
     /// # Errors
     /// Names the coordinate.
     pub fn check(self) -> Result<(), Refusal> {
-        for (what, value) in [("x in m", self.x.0), ("y in m", self.y.0), ("heading in rad", self.heading.0)] {
+        for (what, value) in [("x in m", self.x.0), ("y in m", self.y.0), ("heading in rad", self.heading.0)]
+        {
             crate::refusal::within(what, value, -1e9, 1e9)?;
         }
         Ok(())

@@ -49,9 +49,12 @@ impl Message for Status {
     const NAME: &'static str = "Status";
     const LIMIT: usize = 16 * 1024;
     fn check(&self) -> Result<(), Refusal> {
-        for (what, text) in
-            [("service", &self.service), ("robot", &self.robot), ("host", &self.host), ("version", &self.version)]
-        {
+        for (what, text) in [
+            ("service", &self.service),
+            ("robot", &self.robot),
+            ("host", &self.host),
+            ("version", &self.version),
+        ] {
             limit_list(&format!("letters of {what}"), text.len(), 128)?;
         }
         limit_list("keys that a process says", self.says.len(), MAX_KEYS)?;

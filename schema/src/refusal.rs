@@ -83,7 +83,10 @@ pub enum Refusal {
         /// Who was asked.
         what: String,
         /// How long the asker waited.
-        #[serde(serialize_with = "crate::unit::finite", deserialize_with = "crate::unit::deserialize_finite")]
+        #[serde(
+            serialize_with = "crate::unit::finite",
+            deserialize_with = "crate::unit::deserialize_finite"
+        )]
         seconds: f64,
     },
     /// Somebody else has it.

@@ -66,7 +66,8 @@ impl Message for Fix {
     fn check(&self) -> Result<(), Refusal> {
         within("variance of x", self.covariance.0[0], 0.0, f64::MAX)?;
         within("variance of y", self.covariance.0[3], 0.0, f64::MAX)?;
-        self.heading.map_or(Ok(()), |heading| within("variance of the heading", heading.variance, 0.0, f64::MAX))
+        self.heading
+            .map_or(Ok(()), |heading| within("variance of the heading", heading.variance, 0.0, f64::MAX))
     }
 }
 impl Message for Signals {

@@ -32,7 +32,11 @@ impl Datum for EncodersData {
         }
     }
     fn after(&self, span: &EncodersSpan) -> Self {
-        Self { stamp: self.stamp + span.duration, left: self.left + span.left, right: self.right + span.right }
+        Self {
+            stamp: self.stamp + span.duration,
+            left: self.left + span.left,
+            right: self.right + span.right,
+        }
     }
 }
 

@@ -23,7 +23,11 @@ pub fn deserialize_finite<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::
             f.write_str("a finite number")
         }
         fn visit_f64<E: serde::de::Error>(self, value: f64) -> Result<f64, E> {
-            if value.is_finite() { Ok(value) } else { Err(E::custom(format_args!("{value} is not a finite number"))) }
+            if value.is_finite() {
+                Ok(value)
+            } else {
+                Err(E::custom(format_args!("{value} is not a finite number")))
+            }
         }
         fn visit_u64<E: serde::de::Error>(self, value: u64) -> Result<f64, E> {
             #[allow(clippy::cast_precision_loss, reason = "the nearest float is what an integer means here")]
@@ -223,7 +227,9 @@ impl<const N: usize> Serialize for Numbers<N> {
         let mut items = to.serialize_seq(Some(N))?;
         for &value in &self.0 {
             if !value.is_finite() {
-                return Err(S::Error::custom(format_args!("{value} is not a finite number and cannot be sent")));
+                return Err(S::Error::custom(format_args!(
+                    "{value} is not a finite number and cannot be sent"
+                )));
             }
             items.serialize_element(&value)?;
         }
@@ -247,7 +253,8 @@ impl<'de, const N: usize> Deserialize<'de> for Numbers<N> {
             fn visit_seq<A: serde::de::SeqAccess<'de>>(self, mut seq: A) -> Result<Numbers<N>, A::Error> {
                 let mut numbers = [0.0; N];
                 for (index, number) in numbers.iter_mut().enumerate() {
-                    *number = seq.next_element::<Item>()?.ok_or_else(|| A::Error::invalid_length(index, &self))?.0;
+                    *number =
+                        seq.next_element::<Item>()?.ok_or_else(|| A::Error::invalid_length(index, &self))?.0;
                 }
                 match seq.next_element::<serde::de::IgnoredAny>()? {
                     None => Ok(Numbers(numbers)),
@@ -266,7 +273,9 @@ mod tests {
     #[test]
     fn an_angle_wraps_into_the_half_open_circle() {
         use std::f64::consts::PI;
-        for (angle, wrapped) in [(0.0, 0.0), (PI, PI), (-PI, PI), (3.0 * PI, PI), (-0.5, -0.5), (7.0, 7.0 - 2.0 * PI)] {
+        for (angle, wrapped) in
+            [(0.0, 0.0), (PI, PI), (-PI, PI), (3.0 * PI, PI), (-0.5, -0.5), (7.0, 7.0 - 2.0 * PI)]
+        {
             assert!((Radians(angle).wrapped().0 - wrapped).abs() < 1e-12, "{angle} wraps to {wrapped}");
         }
     }

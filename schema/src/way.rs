@@ -93,7 +93,10 @@ impl Message for WayTask {
 
     fn check(&self) -> Result<(), Refusal> {
         if self.points.is_empty() {
-            return Err(Refusal::missing("way task: a point to visit", "give at least one point, for example \"1,0\""));
+            return Err(Refusal::missing(
+                "way task: a point to visit",
+                "give at least one point, for example \"1,0\"",
+            ));
         }
         if self.points.len() > MAX_POINTS {
             let got = self.points.len() as u64;

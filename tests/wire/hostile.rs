@@ -7,7 +7,7 @@ use axle_schema::meta::Meta;
 use axle_schema::task::{Cancel, CorrectorProgress};
 use axle_schema::window::Window;
 use axle_schema::{
-    Drive, DriveAsk, Dwm, EncodersData, Fix, Message, NavigatorData, Plan, Refusal, Signals, WayTask, decode,
+    Drive, DriveAsk, Dwm, EncodersData, EncodersSpan, Fix, Message, NavigatorData, Plan, Refusal, Signals, WayTask, decode,
 };
 use ciborium::{Value, cbor};
 use std::fmt::Debug;
@@ -195,7 +195,8 @@ fn an_integer_is_taken_for_a_float() {
     assert_eq!(whole, float);
     assert!(whole.is_ok());
     let most = &[0x1b, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff];
-    assert!(decode::<EncodersData>(&map(&[("stamp", most), ("left", &[0]), ("right", &[0])])).is_ok());
+    // The largest integer of CBOR is a float as well where a field has no range.
+    assert!(decode::<EncodersSpan>(&map(&[("duration", most), ("left", &[0]), ("right", &[0])])).is_ok());
     let big = &[0xc2, 0x49, 1, 0, 0, 0, 0, 0, 0, 0, 0];
     let words = "stamp: invalid type: integer `18446744073709551616` as u128";
     check_bytes::<EncodersData>(&map(&[("stamp", big), ("left", &[0]), ("right", &[0])]), words);
@@ -230,6 +231,16 @@ fn a_value_out_of_its_range_is_refused_by_its_name() {
         "y of way point 1 is out of range",
     );
     check_range::<WayTask>(cbor!({ "points" => [] }), "a point to visit is missing");
+    for (field, name) in [("stamp", "stamp"), ("left", "left wheel"), ("right", "right wheel")] {
+        for far in [1.1e9, -1.1e9, f64::MAX] {
+            let value = |of: &str| if of == field { far } else { 0.0 };
+            let reading =
+                cbor!({ "stamp" => value("stamp"), "left" => value("left"), "right" => value("right") });
+            check_range::<EncodersData>(reading, name);
+        }
+    }
+    let lost = cbor!({ "stamp" => 1, "pose" => { "x" => 0, "y" => 0, "heading" => 1.1e9 } });
+    check_range::<NavigatorData>(lost, "heading in rad is out of range");
     check_range::<LeaseAsk>(
         cbor!({ "holder" => "x", "class" => "manual", "period" => 0 }),
         "period of a lease",

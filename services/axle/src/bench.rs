@@ -84,7 +84,10 @@ impl Bed {
     async fn start(settings: &Settings, stop: &mut Stop) -> anyhow::Result<Self> {
         let scratch = std::env::temp_dir().join(format!("axle-bench-{}", std::process::id()));
         std::fs::create_dir_all(&scratch)?;
-        let port = TcpListener::bind("127.0.0.1:0").and_then(|free| free.local_addr()).context("find a free port")?.port();
+        let port = TcpListener::bind("127.0.0.1:0")
+            .and_then(|free| free.local_addr())
+            .context("find a free port")?
+            .port();
         let endpoint = format!("tcp/127.0.0.1:{port}");
         let mut topology = Topology::parse(topology::DEFAULT)?;
         for service in topology.services.iter_mut().filter(|service| service.kind == "recorder") {
@@ -171,7 +174,8 @@ async fn hops(mesh: &Mesh, robot: &RobotId, rounds: u32) -> anyhow::Result<Pair>
     let there = mesh.publisher(&there.of(robot))?;
     let back = mesh.inbox(&back.of(robot), 1)?;
     let caller = mesh.bare().caller().await.map_err(|fault| anyhow::anyhow!("bare Zenoh: {fault}"))?;
-    let pose = NavigatorData { stamp: Seconds(12.34), pose: Pose::new(0.1, 0.2, 0.3), ..NavigatorData::default() };
+    let pose =
+        NavigatorData { stamp: Seconds(12.34), pose: Pose::new(0.1, 0.2, 0.3), ..NavigatorData::default() };
     let size = encode(&pose)?.len();
     // The first rounds wait until each end knows of the other.
     let began = Instant::now();
@@ -182,12 +186,15 @@ async fn hops(mesh: &Mesh, robot: &RobotId, rounds: u32) -> anyhow::Result<Pair>
         if bare.is_ok() && typed.is_ok() {
             break;
         }
-        anyhow::ensure!(began.elapsed() < Duration::from_secs(10), "the other end of the bench does not answer");
+        anyhow::ensure!(
+            began.elapsed() < Duration::from_secs(10),
+            "the other end of the bench does not answer"
+        );
     }
     let mut pair = Pair::new();
     for round in 0..rounds + WARM_UP {
         // What is left of an earlier, slow round would answer this one.
-        drop(back.latest());
+        let _late = back.latest();
         let began = Instant::now();
         there.put(&pose, None)?;
         timeout(LOST, back.next()).await.context("a hop was lost")?;
@@ -221,7 +228,12 @@ impl Pair {
         let quantile = |times: &[Duration]| {
             let mut times = times.to_vec();
             times.sort_unstable();
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss, reason = "an index")]
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                clippy::cast_precision_loss,
+                reason = "an index"
+            )]
             let index = ((times.len().saturating_sub(1)) as f64 * share).round() as usize;
             times.get(index).map_or(0.0, |time| time.as_secs_f64() * 1e6)
         };
@@ -260,12 +272,19 @@ impl Measured {
             });
             return Ok(data(&line.to_string())?);
         }
-        let rows = [("query of Pathfinder", &self.query), ("hop, there and back", &self.hop)].into_iter().flat_map(|(name, pair)| {
-            [("p50", 0.5), ("p99", 0.99)].map(|(share, quantile)| {
-                let (axle, bare, ratio) = pair.at(quantile);
-                vec![format!("{name}, {share}"), format!("{axle:.0} µs"), format!("{bare:.0} µs"), format!("{ratio:.2}")]
-            })
-        });
+        let rows = [("query of Pathfinder", &self.query), ("hop, there and back", &self.hop)]
+            .into_iter()
+            .flat_map(|(name, pair)| {
+                [("p50", 0.5), ("p99", 0.99)].map(|(share, quantile)| {
+                    let (axle, bare, ratio) = pair.at(quantile);
+                    vec![
+                        format!("{name}, {share}"),
+                        format!("{axle:.0} µs"),
+                        format!("{bare:.0} µs"),
+                        format!("{ratio:.2}"),
+                    ]
+                })
+            });
         table(&["", "axle", "bare Zenoh", "ratio"], rows)?;
         data(&format!(
             "{} processes: all alive after {:.2} s; at rest {rss_mb:.0} MB and {:.1} % of a core",

@@ -78,7 +78,10 @@ pub(crate) const CATALOG: &[Entry] = &[
         run: |context| Box::pin(run::pilot::run(context)),
     },
     Entry::functional::<Pathfinder>("pathfinder", "Turns way points into geometries."),
-    Entry::functional::<Pathdriver>("pathdriver", "Turns geometries into movements within the robot's limits."),
+    Entry::functional::<Pathdriver>(
+        "pathdriver",
+        "Turns geometries into movements within the robot's limits.",
+    ),
     Entry::corrector::<DCorrector>(
         "d-corrector",
         Takes::Drive,
@@ -130,5 +133,10 @@ pub(crate) fn names() -> String {
 
 /// The names of all correctors, for messages.
 pub(crate) fn corrector_names() -> String {
-    CATALOG.iter().filter(|entry| entry.takes.is_some()).map(|entry| entry.name).collect::<Vec<_>>().join(", ")
+    CATALOG
+        .iter()
+        .filter(|entry| entry.takes.is_some())
+        .map(|entry| entry.name)
+        .collect::<Vec<_>>()
+        .join(", ")
 }

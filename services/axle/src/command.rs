@@ -35,7 +35,9 @@ pub(crate) async fn dispatch(cli: Cli) -> anyhow::Result<()> {
             let entry = catalog::find(&service).ok_or_else(|| unknown_service(&service))?;
             Ok(data(entry.params.trim_end())?)
         }
-        Command::Bench(crate::cli::Bench::Mesh { json, rounds }) => bench::mesh(&settings, json, rounds).await,
+        Command::Bench(crate::cli::Bench::Mesh { json, rounds }) => {
+            bench::mesh(&settings, json, rounds).await
+        }
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "axle", &mut script);

@@ -30,10 +30,11 @@ const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Runs the demonstration.
 pub(crate) async fn demo(settings: &Settings, args: Demo) -> anyhow::Result<()> {
-    let corrector = catalog::find(&args.corrector).filter(|entry| entry.takes.is_some()).ok_or_else(|| {
-        let known = catalog::corrector_names();
-        usage(format!("--corrector {:?} is unknown; known: {known}", args.corrector))
-    })?;
+    let corrector =
+        catalog::find(&args.corrector).filter(|entry| entry.takes.is_some()).ok_or_else(|| {
+            let known = catalog::corrector_names();
+            usage(format!("--corrector {:?} is unknown; known: {known}", args.corrector))
+        })?;
     let robot = settings.one_robot()?;
     let files = Files::prepare(&args.out)?;
     let topology = build_topology(&args, corrector.name, &robot, &files)?;
@@ -42,7 +43,8 @@ pub(crate) async fn demo(settings: &Settings, args: Demo) -> anyhow::Result<()> 
     let (supervisor, endpoint) = start(settings, &topology, &log, &files, &mut stop).await?;
     let driven = drive(settings, &args, &robot, &endpoint, corrector.name, &supervisor, &mut stop).await;
     supervisor.stop().await;
-    let driven = driven.with_context(|| format!("the demo did not end well; {} says more", files.log.display()))?;
+    let driven =
+        driven.with_context(|| format!("the demo did not end well; {} says more", files.log.display()))?;
     let account = Account::of(&args, &files, driven)?;
     account.report(args.json)?;
     account.verdict()
@@ -58,8 +60,9 @@ pub(crate) struct Files {
 impl Files {
     /// Makes the directory and removes what an earlier demonstration wrote into it.
     fn prepare(out: &Path) -> anyhow::Result<Self> {
-        std::fs::create_dir_all(out)
-            .map_err(|fault| usage(format!("--out {}: cannot make this directory: {fault}", out.display())))?;
+        std::fs::create_dir_all(out).map_err(|fault| {
+            usage(format!("--out {}: cannot make this directory: {fault}", out.display()))
+        })?;
         let out = std::path::absolute(out)?;
         let files =
             Self { chart: out.join("demo.svg"), recording: out.join("demo.mcap"), log: out.join("demo.log") };
@@ -78,14 +81,16 @@ impl Files {
 /// The shipped topology with the seed, the corrector and the recording of this demonstration.
 fn build_topology(args: &Demo, corrector: &str, robot: &RobotId, files: &Files) -> anyhow::Result<Topology> {
     let mut topology = Topology::parse(topology::DEFAULT)?;
-    topology.robots = topology.robots.into_values().map(|body| (topology::RobotName(robot.clone()), body)).collect();
+    topology.robots =
+        topology.robots.into_values().map(|body| (topology::RobotName(robot.clone()), body)).collect();
     for Service { kind, robot: of, params, .. } in &mut topology.services {
         if of.is_some() {
             *of = Some(robot.clone());
         }
         match kind.as_str() {
             "emulator" => {
-                let seed = i64::try_from(args.seed).map_err(|_| usage("--seed: at most 9223372036854775807"))?;
+                let seed =
+                    i64::try_from(args.seed).map_err(|_| usage("--seed: at most 9223372036854775807"))?;
                 params.insert("seed".into(), seed.into());
             }
             "recorder" => {
@@ -109,7 +114,10 @@ async fn start(
     files: &Files,
     stop: &mut Stop,
 ) -> anyhow::Result<(Supervisor, String)> {
-    let port = TcpListener::bind("127.0.0.1:0").and_then(|free| free.local_addr()).context("find a free port")?.port();
+    let port = TcpListener::bind("127.0.0.1:0")
+        .and_then(|free| free.local_addr())
+        .context("find a free port")?
+        .port();
     let endpoint = format!("tcp/127.0.0.1:{port}");
     let (host, _) = topology.host(None)?;
     let started = Instant::now();

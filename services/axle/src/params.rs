@@ -39,7 +39,8 @@ mod tests {
     use axle_emulator::EmulatorParams;
 
     fn load_text(text: &str) -> anyhow::Result<EmulatorParams> {
-        let file = std::env::temp_dir().join(format!("axle-params-{}-{}.toml", std::process::id(), text.len()));
+        let file =
+            std::env::temp_dir().join(format!("axle-params-{}-{}.toml", std::process::id(), text.len()));
         std::fs::write(&file, text).expect("a temporary file");
         let params = load(Some(&file));
         std::fs::remove_file(&file).expect("the temporary file");

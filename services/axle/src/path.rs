@@ -11,7 +11,11 @@ pub(crate) fn of_plan(plan: &Plan) -> Vec<(f64, f64)> {
     let mut points = vec![(pose.x.0, pose.y.0)];
     for leg in &plan.legs {
         if let Geometry::Arc { radius, angle } = leg.geometry {
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 2 to 1000")]
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "clamped to 2 to 1000"
+            )]
             let steps = ((radius.0 * angle.0).abs() / SPACING).clamp(2.0, 1000.0) as u32;
             for step in 1..steps {
                 let share = f64::from(step) / f64::from(steps);
@@ -66,7 +70,8 @@ mod tests {
     #[test]
     fn the_distance_from_a_path_is_that_of_its_nearest_point() {
         let path = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)];
-        for (point, distance) in [((0.5, 0.1), 0.1), ((-0.3, 0.4), 0.5), ((1.2, 0.5), 0.2), ((1.0, 1.0), 0.0)] {
+        for (point, distance) in [((0.5, 0.1), 0.1), ((-0.3, 0.4), 0.5), ((1.2, 0.5), 0.2), ((1.0, 1.0), 0.0)]
+        {
             assert!((distance_to_path(&path, point) - distance).abs() < 1e-12, "{point:?}");
         }
         let (rms, largest) = cross_track(&path, &[(0.5, 0.3), (0.5, -0.4)]);

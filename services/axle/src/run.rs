@@ -52,7 +52,11 @@ impl Context {
 }
 
 /// Runs one service until it is told to stop.
-pub(crate) async fn run(entry: &'static Entry, settings: &Settings, params: Option<PathBuf>) -> anyhow::Result<()> {
+pub(crate) async fn run(
+    entry: &'static Entry,
+    settings: &Settings,
+    params: Option<PathBuf>,
+) -> anyhow::Result<()> {
     let mut stop = crate::signal::stop()?;
     let robot = match entry.scope {
         Scope::AllRobots => settings.robot.clone(),

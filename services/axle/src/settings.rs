@@ -40,7 +40,8 @@ impl Settings {
     pub(crate) fn host_name(&self) -> String {
         self.host.clone().unwrap_or_else(|| {
             let read = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
-            read.or_else(|| std::env::var("HOSTNAME").ok()).map_or_else(|| "localhost".into(), |name| name.trim().into())
+            read.or_else(|| std::env::var("HOSTNAME").ok())
+                .map_or_else(|| "localhost".into(), |name| name.trim().into())
         })
     }
     /// How this process is known on the mesh as `service`.
@@ -67,7 +68,9 @@ pub(crate) async fn join(settings: axle_mesh::Settings, patience: Patience) -> a
             let seconds = waited.as_secs();
             // At first every few seconds, then once a minute: a log is not a clock.
             if seconds <= 3 || (seconds <= 60 && seconds.is_multiple_of(10)) || seconds.is_multiple_of(60) {
-                tracing::info!("waiting for a router at {endpoints} ({seconds} s); start one with `axle router`");
+                tracing::info!(
+                    "waiting for a router at {endpoints} ({seconds} s); start one with `axle router`"
+                );
             }
         }
     };
@@ -90,7 +93,9 @@ pub(crate) fn start_log(level: &str) {
         .with_env_filter(parsed.unwrap_or_else(|_| EnvFilter::new("info,zenoh=off")))
         .with_writer(std::io::stderr)
         .with_target(false)
-        .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()) && std::env::var_os("NO_COLOR").is_none())
+        .with_ansi(
+            std::io::IsTerminal::is_terminal(&std::io::stderr()) && std::env::var_os("NO_COLOR").is_none(),
+        )
         .init();
     if let Some(wrong) = wrong {
         tracing::warn!("--log {level}: {wrong}; logging at info");

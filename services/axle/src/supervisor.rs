@@ -88,7 +88,13 @@ impl Supervisor {
     ///
     /// # Errors
     /// When a parameter file cannot be written; children that cannot start are restarted and logged.
-    pub(crate) fn start(topology: &Topology, host: &str, endpoint: &str, level: &str, log: &Log) -> anyhow::Result<Self> {
+    pub(crate) fn start(
+        topology: &Topology,
+        host: &str,
+        endpoint: &str,
+        level: &str,
+        log: &Log,
+    ) -> anyhow::Result<Self> {
         let directory = std::env::temp_dir().join(format!("axle-{}", std::process::id()));
         std::fs::create_dir_all(&directory).context("make a directory for parameters")?;
         let params = ParamsDirectory(directory);
@@ -140,11 +146,16 @@ impl Supervisor {
         }
         // Correctors that have ended have given the wheels back; the gate brakes meanwhile.
         let braking = Instant::now() + BRAKING;
-        while self.children.iter().filter(correctors).any(|child| child.pid().is_some()) && Instant::now() < braking {
+        while self.children.iter().filter(correctors).any(|child| child.pid().is_some())
+            && Instant::now() < braking
+        {
             tokio::time::sleep(Duration::from_millis(10)).await;
         }
         if self.children.iter().any(|child| correctors(&child)) {
-            tokio::time::sleep(braking.saturating_duration_since(Instant::now()).min(Duration::from_millis(300))).await;
+            tokio::time::sleep(
+                braking.saturating_duration_since(Instant::now()).min(Duration::from_millis(300)),
+            )
+            .await;
         }
         for child in &self.children {
             child.tell(Signal::SIGTERM);
@@ -163,8 +174,13 @@ impl Watched {
     fn start(job: Job, program: &Path, log: &Log) -> Self {
         let pid = Arc::new(Mutex::new(None));
         let (ending, is_ending) = watch::channel(false);
-        let watching =
-            tokio::spawn(watch_over(job.clone(), program.to_owned(), log.clone(), Arc::clone(&pid), is_ending));
+        let watching = tokio::spawn(watch_over(
+            job.clone(),
+            program.to_owned(),
+            log.clone(),
+            Arc::clone(&pid),
+            is_ending,
+        ));
         Self { job, pid, ending, watching }
     }
     fn pid(&self) -> Option<u32> {
@@ -208,7 +224,10 @@ async fn watch_over(
                 for word in words {
                     drop(word.await);
                 }
-                status.map_or_else(|fault| (fault.to_string(), None), |status| (status.to_string(), status.code()))
+                status.map_or_else(
+                    |fault| (fault.to_string(), None),
+                    |status| (status.to_string(), status.code()),
+                )
             }
             Err(fault) => (fault.to_string(), None),
         };

@@ -77,7 +77,10 @@ impl Topology {
     }
 
     fn check(&self) -> anyhow::Result<()> {
-        anyhow::ensure!(!self.hosts.is_empty(), "hosts: at least one computer is needed, for example [hosts.local]");
+        anyhow::ensure!(
+            !self.hosts.is_empty(),
+            "hosts: at least one computer is needed, for example [hosts.local]"
+        );
         anyhow::ensure!(
             self.services.len() <= MAX_SERVICES,
             "services: {} are too many, at most {MAX_SERVICES}",
@@ -126,7 +129,10 @@ impl Topology {
                 .next()
                 .map(|(name, host)| (name.as_str(), host))
                 .ok_or_else(|| usage("the topology names no host")),
-            None => Err(usage(format!("the topology names several computers; choose one with --host: {}", names()))),
+            None => Err(usage(format!(
+                "the topology names several computers; choose one with --host: {}",
+                names()
+            ))),
         }
     }
 
@@ -139,7 +145,8 @@ impl Topology {
     pub(crate) fn params_of(&self, service: &Service) -> anyhow::Result<toml::Table> {
         let mut params = service.params.clone();
         let robot = service.robot.as_ref().and_then(|robot| self.robots.get(&RobotName(robot.clone())));
-        let takes_robot = catalog::find(&service.kind).is_some_and(|entry| entry.params.contains("\n[robot]"));
+        let takes_robot =
+            catalog::find(&service.kind).is_some_and(|entry| entry.params.contains("\n[robot]"));
         if let Some(robot) = robot
             && takes_robot
             && !params.contains_key("robot")

@@ -186,7 +186,8 @@ mod tests {
 
     #[test]
     fn a_standing_robot_stands() {
-        let mut robot = Emulator::new(EmulatorParams { seed: 3, ..EmulatorParams::default() }).expect("a robot");
+        let mut robot =
+            Emulator::new(EmulatorParams { seed: 3, ..EmulatorParams::default() }).expect("a robot");
         for beat in 1..1000 {
             robot.advance(Seconds(f64::from(beat) * 0.005), Sides::default());
         }
@@ -196,7 +197,8 @@ mod tests {
 
     #[test]
     fn how_often_sensors_are_read_does_not_change_how_it_drives() {
-        let mut read = Emulator::new(EmulatorParams { seed: 3, ..EmulatorParams::default() }).expect("a robot");
+        let mut read =
+            Emulator::new(EmulatorParams { seed: 3, ..EmulatorParams::default() }).expect("a robot");
         let mut unread = read.clone();
         for beat in 1..100 {
             for robot in [&mut read, &mut unread] {

@@ -59,6 +59,13 @@ impl Gate {
         }
     }
 
+    /// Counts commands that were larger than a command may be, and were not even read.
+    pub fn oversized(&mut self, commands: u64) {
+        if commands > 0 {
+            self.count(Reject::Oversize, commands);
+        }
+    }
+
     /// Counts commands that were lost before they came to the gate, because a bounded queue was full.
     pub fn overflowed(&mut self, commands: u64) {
         if commands > 0 {

@@ -97,7 +97,10 @@ impl Echo {
     }
 }
 
-async fn publisher(session: &Session, key: &'static str) -> Result<zenoh::pubsub::Publisher<'static>, zenoh::Error> {
+async fn publisher(
+    session: &Session,
+    key: &'static str,
+) -> Result<zenoh::pubsub::Publisher<'static>, zenoh::Error> {
     session
         .declare_publisher(key)
         .priority(Priority::InteractiveHigh)

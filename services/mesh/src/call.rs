@@ -65,7 +65,10 @@ impl Mesh {
             if retry == Retry::Never || Instant::now() + pause >= end {
                 return Err(silence.unwrap_or_else(|| {
                     let service = call.service();
-                    Refusal::unavailable(service, format!("nobody answers at {key}; is `axle run {service}` up?"))
+                    Refusal::unavailable(
+                        service,
+                        format!("nobody answers at {key}; is `axle run {service}` up?"),
+                    )
                 }));
             }
             tokio::time::sleep(pause).await;
@@ -225,7 +228,9 @@ impl<Q: Message, A: Message> Asked<Q, A> {
         };
         match sent {
             Ok(()) => drop(counters.sent.fetch_add(1, Relaxed)),
-            Err(fault) => tracing::debug!(key = %self.query.key_expr(), "the reply could not be sent: {fault}"),
+            Err(fault) => {
+                tracing::debug!(key = %self.query.key_expr(), "the reply could not be sent: {fault}")
+            }
         }
     }
 }

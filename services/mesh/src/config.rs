@@ -29,7 +29,8 @@ pub const LINK: &[(&str, &str)] = &[
 /// Names an endpoint that is not of the form `tcp/host:port`.
 pub(crate) fn client(endpoints: &[String], patience_ms: i64) -> Result<Config, Fault> {
     let mut config = Config::default();
-    let endpoints_json = serde_json::to_string(endpoints).map_err(|_| Fault::Endpoint(endpoints.join(" ")))?;
+    let endpoints_json =
+        serde_json::to_string(endpoints).map_err(|_| Fault::Endpoint(endpoints.join(" ")))?;
     let set = |config: &mut Config, key: &str, value: &str| {
         config.insert_json5(key, value).map_err(|source| Fault::Config { key: key.to_owned(), source })
     };
@@ -41,7 +42,11 @@ pub(crate) fn client(endpoints: &[String], patience_ms: i64) -> Result<Config, F
         .insert_json5("connect/endpoints", &endpoints_json)
         .map_err(|_| Fault::Endpoint(endpoints.join(" ")))?;
     set(&mut config, "connect/timeout_ms", &patience_ms.to_string())?;
-    set(&mut config, "connect/retry", "{ period_init_ms: 50, period_max_ms: 500, period_increase_factor: 2 }")?;
+    set(
+        &mut config,
+        "connect/retry",
+        "{ period_init_ms: 50, period_max_ms: 500, period_increase_factor: 2 }",
+    )?;
     set(&mut config, "listen/endpoints", "[]")?;
     set(&mut config, "queries_default_timeout", "5000")?;
     for (key, value) in LINK {

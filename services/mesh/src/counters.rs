@@ -51,6 +51,10 @@ impl Counters {
         let us = u64::try_from(lateness.as_micros()).unwrap_or(u64::MAX).max(1);
         self.lateness_us.lock().unwrap_or_else(PoisonError::into_inner).saturating_record(us);
     }
+    /// Counts a message that its reader refused.
+    pub fn count_refused(&self) {
+        self.refused.fetch_add(1, Relaxed);
+    }
     /// Beats made.
     #[must_use]
     pub fn beats(&self) -> u64 {

@@ -41,6 +41,8 @@ pub enum Fault {
         source: zenoh::Error,
     },
     /// A key expression that Zenoh does not accept.
-    #[error("{0:?} is not a key expression: no leading or trailing slash, no empty chunk; for example axle/r1/**")]
+    #[error(
+        "{0:?} is not a key expression: no leading or trailing slash, no empty chunk; for example axle/r1/**"
+    )]
     KeyExpression(String),
 }

@@ -5,10 +5,10 @@
 //! when it is full; decoding happens in the beat of the service.
 
 use crate::{Counters, Fault, Mesh};
+use axle_schema::Refusal;
 use axle_schema::codec::{Message, decode, decode_as};
 use axle_schema::key::Key;
 use axle_schema::meta::Meta;
-use axle_schema::Refusal;
 use std::collections::VecDeque;
 use std::marker::PhantomData;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -80,7 +80,12 @@ impl Queue {
 
 impl Cell {
     fn new(capacity: usize) -> Arc<Self> {
-        Arc::new(Self { queue: Mutex::default(), capacity, arrived: Notify::new(), dropped: AtomicU64::new(0) })
+        Arc::new(Self {
+            queue: Mutex::default(),
+            capacity,
+            arrived: Notify::new(),
+            dropped: AtomicU64::new(0),
+        })
     }
     fn store(&self, sample: Sample) {
         let size = sample.payload().len();
@@ -128,6 +133,7 @@ pub struct Heard<M> {
 /// Samples of one key, waiting to be taken.
 pub struct Inbox<M> {
     cell: Arc<Cell>,
+    oversized: Arc<AtomicU64>,
     counters: Arc<Counters>,
     complaints: Complaints,
     // Dropping the subscriber undeclares it.
@@ -150,6 +156,8 @@ impl Mesh {
     pub fn inbox<M: Message>(&self, key: &Key<M>, capacity: usize) -> Result<Inbox<M>, Fault> {
         let cell = Cell::new(capacity);
         let (store, counters) = (Arc::clone(&cell), Arc::clone(&self.counters));
+        let oversized = Arc::new(AtomicU64::new(0));
+        let count_oversized = Arc::clone(&oversized);
         let subscriber = self
             .session
             .declare_subscriber(key.as_str().to_owned())
@@ -157,6 +165,7 @@ impl Mesh {
                 // An oversized payload is not even stored: it costs no memory and no decoding.
                 if sample.payload().len() > M::LIMIT {
                     counters.refused.fetch_add(1, Relaxed);
+                    count_oversized.fetch_add(1, Relaxed);
                 } else {
                     store.store(sample);
                 }
@@ -166,6 +175,7 @@ impl Mesh {
         self.counters.note_hears(key.as_str());
         Ok(Inbox {
             cell,
+            oversized,
             counters: Arc::clone(&self.counters),
             complaints: Complaints::new(key.to_string()),
             _subscriber: subscriber,
@@ -225,6 +235,10 @@ impl<M: Message> Inbox<M> {
     /// Samples that were forgotten because nobody took them in time.
     pub fn dropped(&self) -> u64 {
         self.cell.dropped.load(Relaxed)
+    }
+    /// Samples that were not even stored, since they were larger than the message may be.
+    pub fn oversized(&self) -> u64 {
+        self.oversized.load(Relaxed)
     }
 
     fn read(&self, sample: &Sample) -> Option<Heard<M>> {

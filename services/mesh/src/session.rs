@@ -105,6 +105,12 @@ impl Mesh {
         &self.counters
     }
 
+    /// The same, for a thread of its own.
+    #[must_use]
+    pub fn shared_counters(&self) -> Arc<Counters> {
+        Arc::clone(&self.counters)
+    }
+
     /// Leaves the mesh, within a second.
     ///
     /// Zenoh's own close may take ten seconds when a link is stuck; the process does not wait for that, since the

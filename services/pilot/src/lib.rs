@@ -117,7 +117,8 @@ impl Journey {
             return;
         }
         while let Some(next) = self.way.points.get(self.reached) {
-            if !(next.distance(pose) <= params.arrival) {
+            let is_near = next.distance(pose) <= params.arrival;
+            if !is_near {
                 break;
             }
             self.reached += 1;
@@ -146,7 +147,8 @@ impl Journey {
 
     /// Looks at the clock: a corrector that says nothing for too long has failed the task.
     pub fn wait(&mut self, params: &PilotParams, at: Seconds) {
-        if self.phase == Phase::Running && !(at - self.heard <= params.silence) {
+        let is_silent = at - self.heard > params.silence;
+        if self.phase == Phase::Running && is_silent {
             let what = self.corrector.clone();
             let hint = format!("it said nothing for {:.1} s; is `axle run {what}` up?", (at - self.heard).0);
             self.end(Phase::Failed(Refusal::unavailable(what, hint)), at);
@@ -187,10 +189,18 @@ impl Journey {
         if left <= params.arrival && self.reached == self.way.points.len() {
             Phase::Done
         } else if left <= params.arrival {
-            let why = format!("{} of {} way points were passed within {}", self.reached, self.way.points.len(), params.arrival);
+            let why = format!(
+                "{} of {} way points were passed within {}",
+                self.reached,
+                self.way.points.len(),
+                params.arrival
+            );
             Phase::Failed(Refusal::Failed { why })
         } else {
-            let why = format!("{} ended {left:.3} from the last way point, allowed is {}", self.corrector, params.arrival);
+            let why = format!(
+                "{} ended {left:.3} from the last way point, allowed is {}",
+                self.corrector, params.arrival
+            );
             Phase::Failed(Refusal::Failed { why })
         }
     }
@@ -202,7 +212,8 @@ mod tests {
 
     fn journey() -> Journey {
         let way = WayTask::parse("0,0 1,0 1,1").expect("a way");
-        let mut journey = Journey::begin(TaskId(7), way, "d-corrector".into(), Pose::default(), Seconds(10.0));
+        let mut journey =
+            Journey::begin(TaskId(7), way, "d-corrector".into(), Pose::default(), Seconds(10.0));
         journey.drive(Seconds(10.1));
         journey
     }
@@ -222,14 +233,22 @@ mod tests {
     fn points_are_reached_in_their_order() {
         let (params, mut journey) = (PilotParams::default(), journey());
         journey.see(&params, Pose::new(1.0, 1.0, 0.0));
-        assert_eq!(journey.progress(Seconds(11.0)).reached, 0, "the last point does not count before the first");
+        assert_eq!(
+            journey.progress(Seconds(11.0)).reached,
+            0,
+            "the last point does not count before the first"
+        );
         for (pose, reached) in [((0.0, 0.0), 1), ((0.5, 0.0), 1), ((0.97, 0.0), 2), ((1.0, 0.96), 3)] {
             journey.see(&params, Pose::new(pose.0, pose.1, 0.0));
             assert_eq!(journey.progress(Seconds(11.0)).reached, reached, "at {pose:?}");
         }
         journey.hear(&params, &said(Phase::Done, 1.0), Seconds(12.0));
         assert_eq!(*journey.phase(), Phase::Done);
-        assert_eq!(journey.progress(Seconds(99.0)).elapsed, Seconds(2.0), "the clock of a task stops with it");
+        assert_eq!(
+            journey.progress(Seconds(99.0)).elapsed,
+            Seconds(2.0),
+            "the clock of a task stops with it"
+        );
     }
 
     #[test]
@@ -247,7 +266,9 @@ mod tests {
         journey.wait(&params, Seconds(11.0));
         assert_eq!(*journey.phase(), Phase::Running);
         journey.wait(&params, Seconds(11.7));
-        assert!(matches!(journey.phase(), Phase::Failed(Refusal::Unavailable { what, .. }) if what == "d-corrector"));
+        assert!(
+            matches!(journey.phase(), Phase::Failed(Refusal::Unavailable { what, .. }) if what == "d-corrector")
+        );
         journey.hear(&params, &said(Phase::Running, 0.5), Seconds(11.8));
         assert!(journey.phase().is_over(), "a task ends once");
     }

@@ -17,7 +17,8 @@ pub(crate) struct Usage {
 impl Usage {
     /// Of all these processes together; one that has ended counts nothing.
     pub(crate) fn of(pids: impl Iterator<Item = u32>) -> Self {
-        pids.filter_map(one).fold(Self::default(), |sum, one| Self { rss: sum.rss + one.rss, cpu: sum.cpu + one.cpu })
+        pids.filter_map(one)
+            .fold(Self::default(), |sum, one| Self { rss: sum.rss + one.rss, cpu: sum.cpu + one.cpu })
     }
 }
 

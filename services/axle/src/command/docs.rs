@@ -51,7 +51,9 @@ fn keys() -> String {
 }
 
 fn services() -> String {
-    let mut text = format!("# Services and their parameters\n\n{GENERATED}\n| service | works for | what it does |\n|---|---|---|\n");
+    let mut text = format!(
+        "# Services and their parameters\n\n{GENERATED}\n| service | works for | what it does |\n|---|---|---|\n"
+    );
     for entry in CATALOG {
         let scope = match entry.scope {
             Scope::AllRobots => "all robots",
@@ -61,7 +63,13 @@ fn services() -> String {
         let _ = writeln!(text, "| [`{0}`](#{0}) | {scope} | {1} |", entry.name, entry.about);
     }
     for entry in CATALOG {
-        let _ = write!(text, "\n## {}\n\n{}\n\n```toml\n{}\n```\n", entry.name, entry.about, entry.params.trim_end());
+        let _ = write!(
+            text,
+            "\n## {}\n\n{}\n\n```toml\n{}\n```\n",
+            entry.name,
+            entry.about,
+            entry.params.trim_end()
+        );
     }
     text
 }

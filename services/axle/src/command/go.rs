@@ -50,9 +50,9 @@ pub(crate) async fn follow(
     mut show: impl FnMut(&PilotProgress),
 ) -> anyhow::Result<PilotProgress> {
     loop {
-        let heard = timeout(SILENCE, words.next())
-            .await
-            .map_err(|_| anyhow::anyhow!("the pilot said nothing for 3 s: it has ended, or the router has"))?;
+        let heard = timeout(SILENCE, words.next()).await.map_err(|_| {
+            anyhow::anyhow!("the pilot said nothing for 3 s: it has ended, or the router has")
+        })?;
         let progress = heard.message;
         if progress.task == task {
             show(&progress);
@@ -102,7 +102,8 @@ pub(crate) struct Bar {
 impl Bar {
     pub(crate) fn new() -> Self {
         let bar = ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::stderr_with_hz(10));
-        let style = ProgressStyle::with_template("{bar:30} {percent:>3}% {msg}").unwrap_or_else(|_| ProgressStyle::default_bar());
+        let style = ProgressStyle::with_template("{bar:30} {percent:>3}% {msg}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
         bar.set_style(style);
         Self { bar }
     }

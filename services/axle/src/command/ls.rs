@@ -28,7 +28,8 @@ pub(super) async fn ls(settings: &Settings, args: &Ls) -> anyhow::Result<()> {
     let mut streams: BTreeMap<String, Heard> = BTreeMap::new();
     while let Ok(raw) = timeout_at(end, tap.next()).await {
         let stream = streams.entry(raw.key).or_default();
-        stream.schema = raw.encoding.split_once(';').map_or(raw.encoding.clone(), |(_, schema)| schema.to_owned());
+        stream.schema =
+            raw.encoding.split_once(';').map_or(raw.encoding.clone(), |(_, schema)| schema.to_owned());
         stream.count += 1;
         stream.bytes += raw.payload.len() as u64;
     }
@@ -57,7 +58,8 @@ fn print(streams: &BTreeMap<String, Heard>, args: &Ls) -> anyhow::Result<()> {
     #[allow(clippy::cast_precision_loss, reason = "rates for people")]
     let rate = |stream: &Heard| stream.count as f64 / args.seconds;
     #[allow(clippy::cast_precision_loss, reason = "sizes for people")]
-    let size = |stream: &Heard| if stream.count > 0 { stream.bytes as f64 / stream.count as f64 } else { 0.0 };
+    let size =
+        |stream: &Heard| if stream.count > 0 { stream.bytes as f64 / stream.count as f64 } else { 0.0 };
     if args.json {
         let rows: Vec<_> = streams
             .iter()

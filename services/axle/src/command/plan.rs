@@ -65,18 +65,29 @@ fn describe(geometry: &Geometry) -> (&'static str, String) {
     match geometry {
         Geometry::Line { length } => ("line", format!("{length:.3}")),
         Geometry::Turn { angle } => ("turn", format!("{:.1}°", angle.0.to_degrees())),
-        Geometry::Arc { radius, angle } => ("arc", format!("{:.1}° at radius {radius:.3}", angle.0.to_degrees())),
+        Geometry::Arc { radius, angle } => {
+            ("arc", format!("{:.1}° at radius {radius:.3}", angle.0.to_degrees()))
+        }
     }
 }
 
 fn at(pose: Pose) -> String {
     // Adding 0 makes a negative zero a plain one.
     let clean = |value: f64| (value * 1e3).round() / 1e3 + 0.0;
-    format!("{:.3}, {:.3} m, {:.1}°", clean(pose.x.0), clean(pose.y.0), clean(pose.heading.wrapped().0.to_degrees()))
+    format!(
+        "{:.3}, {:.3} m, {:.1}°",
+        clean(pose.x.0),
+        clean(pose.y.0),
+        clean(pose.heading.wrapped().0.to_degrees())
+    )
 }
 
 fn print_drive(drive: &Drive) -> anyhow::Result<()> {
-    let legs = drive.counts.iter().enumerate().flat_map(|(leg, &count)| std::iter::repeat_n(leg + 1, count as usize));
+    let legs = drive
+        .counts
+        .iter()
+        .enumerate()
+        .flat_map(|(leg, &count)| std::iter::repeat_n(leg + 1, count as usize));
     let rows = drive.dwms.iter().zip(legs).enumerate().map(|(index, (dwm, leg))| {
         let (start, end) = (dwm.start(), dwm.end());
         vec![

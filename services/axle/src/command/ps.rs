@@ -17,13 +17,16 @@ pub(super) async fn ps(settings: &Settings, json: bool) -> anyhow::Result<()> {
     }
     everybody.sort_by(|(a, _), (b, _)| (&a.robot, &a.service, a.pid).cmp(&(&b.robot, &b.service, b.pid)));
     if json {
-        let rows: Vec<_> = everybody.iter().map(|(presence, status)| json_row(presence, status.as_ref())).collect();
+        let rows: Vec<_> =
+            everybody.iter().map(|(presence, status)| json_row(presence, status.as_ref())).collect();
         data(&serde_json::to_string(&rows)?)?;
     } else if everybody.is_empty() {
         note("no service is alive; start them with `axle up`, or one with `axle run SERVICE`");
     } else {
-        let header =
-            ["service", "robot", "host", "pid", "version", "uptime", "beats", "late", "late p99", "sent", "received", "refused"];
+        let header = [
+            "service", "robot", "host", "pid", "version", "uptime", "beats", "late", "late p99", "sent",
+            "received", "refused",
+        ];
         table(&header, everybody.iter().map(|(presence, status)| row(presence, status.as_ref())))?;
     }
     mesh.leave().await;

@@ -23,7 +23,9 @@ pub(super) async fn stop(settings: &Settings, json: bool) -> anyhow::Result<()> 
     let acknowledged = loop {
         mesh.put_once(&key::STOP.of(&robot), &order)?;
         let until = Instant::now() + REPEAT;
-        if let Some(state) = await_state(&states, until, |state| state.stop == Some(id) && !state.enabled).await {
+        if let Some(state) =
+            await_state(&states, until, |state| state.stop == Some(id) && !state.enabled).await
+        {
             break Some(state);
         }
         if started.elapsed() > PATIENCE {
@@ -32,13 +34,18 @@ pub(super) async fn stop(settings: &Settings, json: bool) -> anyhow::Result<()> 
     };
     let took = started.elapsed();
     let Some(state) = acknowledged else {
-        anyhow::bail!("{robot} did not acknowledge the stop within 2 s: it may still move; is its robot or emulator up?");
+        anyhow::bail!(
+            "{robot} did not acknowledge the stop within 2 s: it may still move; is its robot or emulator up?"
+        );
     };
     if json {
         let line = serde_json::json!({ "robot": robot, "stop": id, "acknowledged": true, "ms": took.as_secs_f64() * 1e3, "state": state });
         data(&line.to_string())?;
     } else {
-        note(&format!("{robot} is stopped (stop {id}, acknowledged after {:.0} ms); `axle enable` lets it move again", took.as_secs_f64() * 1e3));
+        note(&format!(
+            "{robot} is stopped (stop {id}, acknowledged after {:.0} ms); `axle enable` lets it move again",
+            took.as_secs_f64() * 1e3
+        ));
     }
     mesh.leave().await;
     Ok(())
@@ -49,7 +56,8 @@ pub(super) async fn enable(settings: &Settings, json: bool) -> anyhow::Result<()
     let mesh = settings.join("enable").await?;
     let state = newest_state(&mesh, &robot).await?;
     let ask = Enable { stop: state.stop, boot: state.boot, echo: state.tick, by: mesh.name() };
-    let Done {} = mesh.ask(&key::ENABLE, Some(&robot), &ask, Duration::from_secs(2), Retry::Idempotent).await?;
+    let Done {} =
+        mesh.ask(&key::ENABLE, Some(&robot), &ask, Duration::from_secs(2), Retry::Idempotent).await?;
     if json {
         data(&serde_json::json!({ "robot": robot, "enabled": true }).to_string())?;
     } else {

@@ -116,7 +116,8 @@ fn brief(value: &serde_json::Value) -> String {
         Value::Array(items) if items.len() > 4 => format!("[… {} items]", items.len()),
         Value::Array(items) => format!("[{}]", items.iter().map(brief).collect::<Vec<_>>().join(", ")),
         Value::Object(fields) => {
-            let fields: Vec<_> = fields.iter().map(|(name, value)| format!("{name}: {}", brief(value))).collect();
+            let fields: Vec<_> =
+                fields.iter().map(|(name, value)| format!("{name}: {}", brief(value))).collect();
             format!("{{{}}}", fields.join(", "))
         }
         other => other.to_string(),

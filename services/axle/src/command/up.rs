@@ -49,7 +49,8 @@ pub(super) async fn up(settings: &Settings, args: Up) -> anyhow::Result<()> {
 
 /// Finds out before anything is started that the port is taken.
 fn check_free(endpoint: &str) -> anyhow::Result<()> {
-    axle_mesh::config::check_endpoint(endpoint).map_err(|fault| crate::out::usage(format!("--listen: {fault}")))?;
+    axle_mesh::config::check_endpoint(endpoint)
+        .map_err(|fault| crate::out::usage(format!("--listen: {fault}")))?;
     let address = endpoint.trim_start_matches("tcp/");
     match TcpListener::bind(address) {
         Ok(_) => Ok(()),
@@ -64,7 +65,11 @@ fn check_free(endpoint: &str) -> anyhow::Result<()> {
 ///
 /// # Errors
 /// Names the services that gave up or did not come.
-pub(crate) async fn all_alive(settings: &Settings, endpoint: &str, supervisor: &Supervisor) -> anyhow::Result<()> {
+pub(crate) async fn all_alive(
+    settings: &Settings,
+    endpoint: &str,
+    supervisor: &Supervisor,
+) -> anyhow::Result<()> {
     let mut missing: BTreeSet<(String, String)> = supervisor
         .processes()
         .into_iter()

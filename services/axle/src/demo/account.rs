@@ -95,7 +95,11 @@ impl Account {
         self.statuses.iter().map(|status| status.late).sum()
     }
     fn late_p99(&self) -> Seconds {
-        self.statuses.iter().filter(|status| status.beats > 0).map(|status| status.late_p99).fold(Seconds::ZERO, Seconds::max)
+        self.statuses
+            .iter()
+            .filter(|status| status.beats > 0)
+            .map(|status| status.late_p99)
+            .fold(Seconds::ZERO, Seconds::max)
     }
 
     /// Prints the table, or the JSON object.
@@ -117,7 +121,8 @@ impl Account {
         ];
         table(&["result", ""], rows.map(|(name, value)| vec![name.to_owned(), value]))?;
         let services = self.statuses.iter().map(|status| {
-            let p99 = if status.beats > 0 { format!("{:.1} ms", status.late_p99.0 * 1e3) } else { "-".into() };
+            let p99 =
+                if status.beats > 0 { format!("{:.1} ms", status.late_p99.0 * 1e3) } else { "-".into() };
             let counts = [status.sent, status.received, status.refused, status.beats, status.late];
             let mut row = vec![status.service.clone(), status.pid.to_string()];
             row.extend(counts.map(|count| count.to_string()));
@@ -131,8 +136,11 @@ impl Account {
     }
 
     fn to_json(&self) -> serde_json::Value {
-        let processes: Vec<_> =
-            self.processes.iter().map(|(service, pid)| serde_json::json!({ "service": service, "pid": pid })).collect();
+        let processes: Vec<_> = self
+            .processes
+            .iter()
+            .map(|(service, pid)| serde_json::json!({ "service": service, "pid": pid }))
+            .collect();
         let messages: serde_json::Map<_, _> = self
             .statuses
             .iter()

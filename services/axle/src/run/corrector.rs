@@ -182,7 +182,9 @@ impl<C: Driven> Post<C> {
                 Err(TryRecvError::Empty) => {
                     self.voice.account(task.id, Phase::Running, Account::default(), None);
                 }
-                Err(TryRecvError::Closed) => self.begin(Err(Refusal::internal("asking for the wheels ended early"))),
+                Err(TryRecvError::Closed) => {
+                    self.begin(Err(Refusal::internal("asking for the wheels ended early")))
+                }
             },
             Stage::Driving { .. } => self.step(),
         }
@@ -305,6 +307,9 @@ fn lost(state: &GateState, lease: &Lease, seq: u32) -> Option<Refusal> {
     }
     // The state of before the first command may still be on its way.
     (seq > 1 && state.epoch == lease.epoch && state.holder.is_none()).then(|| Refusal::Fenced {
-        why: format!("the gate took the wheels back ({:?}): commands came too late or not at all", state.cause),
+        why: format!(
+            "the gate took the wheels back ({:?}): commands came too late or not at all",
+            state.cause
+        ),
     })
 }

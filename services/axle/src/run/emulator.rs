@@ -7,7 +7,8 @@ use super::Context;
 use crate::params::load;
 use axle_emulator::{Emulator, EmulatorParams};
 use axle_gate::{COMMANDS_PER_BEAT, Gate, Headline};
-use axle_mesh::{Inbox, Mesh, Publisher, Server};
+use axle_mesh::{Counters, Inbox, Mesh, Publisher, Server};
+use axle_schema::codec::decode_as;
 use axle_schema::command::{AllStop, Command, Done, Enable, GateState, Lease, LeaseAsk, Release};
 use axle_schema::meta::Cause;
 use axle_schema::{EncodersData, InertialData, NavigatorData, Refusal, RobotId, Seconds, key};
@@ -77,7 +78,9 @@ struct Board {
     inertial: Paced<InertialData>,
     truth: Paced<NavigatorData>,
     said: Option<(Headline, Seconds)>,
-    overflowed: u64,
+    /// Commands that were forgotten, and that were too large, as far as the gate has counted them.
+    unread: (u64, u64),
+    counters: Arc<Counters>,
     obeyed: Option<Cause>,
 }
 
@@ -96,17 +99,15 @@ impl Board {
             inertial: Paced::new(mesh.publisher(&key::INERTIAL.of(robot))?, params.rates.inertial_hz),
             truth: Paced::new(mesh.publisher(&key::TRUTH.of(robot))?, params.rates.truth_hz),
             said: None,
-            overflowed: 0,
+            unread: (0, 0),
+            counters: mesh.shared_counters(),
             obeyed: None,
         })
     }
 
     fn beat(&mut self, now: Seconds) {
         // Stops come first: nothing that arrived with them may move a wheel.
-        while let Some(stop) = self.stops.take() {
-            tracing::warn!(stop = %stop.message.id, "AllStop by {}", stop.message.by);
-            self.gate.stop(now, stop.message.id);
-        }
+        self.hear_stops(now);
         while let Some(asked) = self.leases.try_next() {
             let answer = asked.question().and_then(|ask| self.gate.lease(now, &ask));
             asked.reply(answer);
@@ -129,15 +130,35 @@ impl Board {
         truth.put(now, *obeyed, || emulator.truth());
     }
 
+    fn hear_stops(&mut self, now: Seconds) {
+        while let Some(raw) = self.stops.take_raw() {
+            match decode_as::<AllStop>(&raw.encoding, &raw.payload) {
+                Ok(stop) => {
+                    tracing::warn!(stop = %stop.id, "AllStop by {}", stop.by);
+                    self.gate.stop(now, stop.id);
+                }
+                // Whoever speaks on this key wants the wheels to stand, even if the words are wrong.
+                Err(refusal) => {
+                    tracing::warn!("an AllStop that cannot be read disables the drive: {refusal}");
+                    self.gate.disable(now);
+                }
+            }
+        }
+    }
+
     fn hear_commands(&mut self, now: Seconds) {
-        let dropped = self.commands.dropped();
-        self.gate.overflowed(dropped - self.overflowed);
-        self.overflowed = dropped;
+        let unread = (self.commands.dropped(), self.commands.oversized());
+        self.gate.overflowed(unread.0 - self.unread.0);
+        self.gate.oversized(unread.1 - self.unread.1);
+        self.unread = unread;
         for _ in 0..COMMANDS_PER_BEAT {
             let Some(raw) = self.commands.take_raw() else { break };
             match self.gate.command(now, &raw.encoding, &raw.payload) {
                 Ok(()) => self.obeyed = raw.meta().map(|meta| Cause { source: meta.source, seq: meta.seq }),
-                Err(reject) => tracing::debug!("command refused: {reject:?}"),
+                Err(reject) => {
+                    self.counters.count_refused();
+                    tracing::debug!("command refused: {reject:?}");
+                }
             }
         }
     }

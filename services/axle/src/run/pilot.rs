@@ -134,7 +134,8 @@ impl Pilot {
             return Err(unknown_corrector(&corrector));
         }
         let Some(seen) = self.pose else {
-            let hint = "no pose has been heard; are `axle run navigator`, `source` and the robot or `emulator` up?";
+            let hint =
+                "no pose has been heard; are `axle run navigator`, `source` and the robot or `emulator` up?";
             return Err(Refusal::unavailable("navigator", hint));
         };
         self.end(Phase::Replaced, now);
@@ -171,7 +172,8 @@ impl Pilot {
             self.end(Phase::Canceled, now);
             Ok(Done {})
         } else {
-            let known = self.journey.as_ref().map_or_else(|| "none".to_owned(), |journey| journey.task().to_string());
+            let known =
+                self.journey.as_ref().map_or_else(|| "none".to_owned(), |journey| journey.task().to_string());
             Err(Refusal::Unknown { what: "task".into(), got: task.to_string(), known })
         }
     }

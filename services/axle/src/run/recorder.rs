@@ -34,7 +34,8 @@ pub(crate) async fn run(mut context: Context) -> anyhow::Result<()> {
     let recorder = Recorder::create(&path, &about, &params, nanoseconds_now())?;
     let tap = context.mesh.tap(&key::everything(Some(&robot)), WAITING)?;
     let (samples, waiting) = sync_channel(WAITING);
-    let writer = std::thread::Builder::new().name("recorder".into()).spawn(move || write(recorder, &waiting))?;
+    let writer =
+        std::thread::Builder::new().name("recorder".into()).spawn(move || write(recorder, &waiting))?;
     let _visible = context.ready()?;
     tracing::info!("recording to {}", path.display());
     let mut lost = Lost::default();
