@@ -168,14 +168,24 @@ impl Drop for Meeting {
     }
 }
 
-/// Waits until exactly one process of each of these services is alive; returns their presences by name.
+/// Waits until the router knows everything that this session has declared: links keep their order, so an answer of the
+/// router comes after what it was told before the question.
+pub(crate) async fn declared(mesh: &Mesh) {
+    mesh.everybody(PATIENCE).await.expect("an answer of the router");
+}
+
+/// Waits until a process of each of these services is alive; returns their presences by name.
 pub(crate) async fn all_alive(mesh: &Mesh, services: &[&str]) -> BTreeMap<String, Presence> {
     let mut comings = mesh.watch_presence().expect("presence");
     let mut alive: BTreeMap<String, Presence> = BTreeMap::new();
     let all = async {
         while !services.iter().all(|service| alive.values().any(|presence| presence.service == *service)) {
             let (presence, came) = comings.next().await;
-            if came { alive.insert(presence.alive(), presence) } else { alive.remove(&presence.alive()) };
+            if came {
+                alive.insert(presence.alive(), presence)
+            } else {
+                alive.remove(&presence.alive())
+            };
         }
     };
     within(PATIENCE, &format!("{services:?} are alive"), all).await;

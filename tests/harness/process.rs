@@ -72,7 +72,8 @@ impl Process {
             .process_group(0)
             .spawn()
             .expect("the program");
-        let what = args.iter().map(|arg| arg.chars().take(40).collect::<String>()).collect::<Vec<_>>().join(" ");
+        let what =
+            args.iter().map(|arg| arg.chars().take(40).collect::<String>()).collect::<Vec<_>>().join(" ");
         Self { child, what: format!("axle {what}"), out, err, begun: Instant::now() }
     }
 
@@ -97,7 +98,8 @@ impl Process {
     }
     /// Waits until its words for people hold this.
     pub(crate) async fn says(&self, words: &str) {
-        eventually(&format!("{} says {words:?}", self.what), || self.err().contains(words).then_some(())).await;
+        eventually(&format!("{} says {words:?}", self.what), || self.err().contains(words).then_some(()))
+            .await;
     }
     pub(crate) fn is_running(&mut self) -> bool {
         self.child.try_wait().expect("a child").is_none()

@@ -1,6 +1,6 @@
 //! An emulated robot with everything that drives it, and eyes to watch it.
 
-use super::{PATIENCE, Process, World, all_alive, within};
+use super::{PATIENCE, Process, World, all_alive, declared, within};
 use axle_mesh::{Inbox, Mesh};
 use axle_schema::command::{GateState, Motion};
 use axle_schema::{EncodersData, NavigatorData, RobotId, Seconds, key};
@@ -43,8 +43,8 @@ impl Robot {
         &self.services[name]
     }
     /// Watches the robot from now on.
-    pub(crate) fn eyes(&self) -> Eyes {
-        Eyes::of(&self.mesh)
+    pub(crate) async fn eyes(&self) -> Eyes {
+        Eyes::of(&self.mesh).await
     }
     /// Starts `axle go`.
     pub(crate) fn go(&self, way: &str) -> Process {
@@ -60,13 +60,15 @@ pub(crate) struct Eyes {
 }
 
 impl Eyes {
-    pub(crate) fn of(mesh: &Mesh) -> Self {
+    pub(crate) async fn of(mesh: &Mesh) -> Self {
         let robot = r1();
-        Self {
+        let eyes = Self {
             truth: mesh.inbox(&key::TRUTH.of(&robot), 4096).expect("truth"),
             encoders: mesh.inbox(&key::ENCODERS.of(&robot), 4096).expect("encoders"),
             states: mesh.inbox(&key::GATE_STATE.of(&robot), 4096).expect("states"),
-        }
+        };
+        declared(mesh).await;
+        eyes
     }
     /// The next truth of which this holds.
     pub(crate) async fn sees(&self, what: &str, is_so: impl Fn(&NavigatorData) -> bool) -> NavigatorData {

@@ -7,7 +7,8 @@ use axle_schema::meta::Meta;
 use axle_schema::task::{Cancel, CorrectorProgress};
 use axle_schema::window::Window;
 use axle_schema::{
-    Drive, DriveAsk, Dwm, EncodersData, EncodersSpan, Fix, Message, NavigatorData, Plan, Refusal, Signals, WayTask, decode,
+    Drive, DriveAsk, Dwm, EncodersData, EncodersSpan, Fix, Message, NavigatorData, Plan, Refusal, Signals,
+    WayTask, decode,
 };
 use ciborium::{Value, cbor};
 use std::fmt::Debug;

@@ -1,8 +1,8 @@
 //! One child process per service: started, watched, restarted with growing pauses, and ended together.
 //!
 //! The children stand in process groups of their own, so that Ctrl-C reaches the supervisor alone and it can end
-//! them in order: the correctors first, which give the wheels back, then the rest when the robot stands. A child
-//! whose supervisor is killed sees the end of its stdin and ends too.
+//! them in order: the correctors first, which give the wheels back, then the rest; the process that owns the wheels
+//! brakes before it ends. A child whose supervisor is killed sees the end of its stdin and ends too.
 
 use crate::out::note;
 use crate::signal::PARENT;
@@ -25,8 +25,8 @@ use tokio::time::{Instant, timeout};
 const PAUSES: (Duration, Duration) = (Duration::from_millis(200), Duration::from_secs(5));
 const STEADY: Duration = Duration::from_secs(10);
 /// How long correctors may take to give the wheels back, and everybody to end, before they are killed.
-const BRAKING: Duration = Duration::from_millis(900);
-const ENDING: Duration = Duration::from_millis(800);
+const GIVING_BACK: Duration = Duration::from_millis(600);
+const ENDING: Duration = Duration::from_millis(1200);
 
 /// Where the children's words go.
 #[derive(Clone)]
@@ -144,18 +144,11 @@ impl Supervisor {
         for child in self.children.iter().filter(correctors) {
             child.tell(Signal::SIGTERM);
         }
-        // Correctors that have ended have given the wheels back; the gate brakes meanwhile.
-        let braking = Instant::now() + BRAKING;
+        let deadline = Instant::now() + GIVING_BACK;
         while self.children.iter().filter(correctors).any(|child| child.pid().is_some())
-            && Instant::now() < braking
+            && Instant::now() < deadline
         {
             tokio::time::sleep(Duration::from_millis(10)).await;
-        }
-        if self.children.iter().any(|child| correctors(&child)) {
-            tokio::time::sleep(
-                braking.saturating_duration_since(Instant::now()).min(Duration::from_millis(300)),
-            )
-            .await;
         }
         for child in &self.children {
             child.tell(Signal::SIGTERM);

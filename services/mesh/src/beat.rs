@@ -6,7 +6,6 @@
 use crate::{Clock, Counters, Mesh};
 use axle_schema::Seconds;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Duration;
 
 /// A beat of an asynchronous loop.
@@ -26,8 +25,8 @@ impl Mesh {
         Beat { period, due, clock: self.clock(), counters: Arc::clone(&self.counters) }
     }
 
-    /// Runs `act` at every beat on a thread of its own, which no other work of the process can hold up, until `act`
-    /// returns `false` or `stop` is set. `act` gets the time of this process; it never gets the same time twice.
+    /// Runs `act` at every beat on a thread of its own, which no other work of the process can hold up, until it
+    /// returns `false`. It gets the time of this process, and never the same time twice.
     ///
     /// # Errors
     /// When the operating system gives no thread.
@@ -35,12 +34,11 @@ impl Mesh {
         &self,
         name: &str,
         period: Seconds,
-        stop: Arc<AtomicBool>,
         mut act: impl FnMut(Seconds) -> bool + Send + 'static,
     ) -> std::io::Result<std::thread::JoinHandle<()>> {
         let mut beat = self.beat(period);
         std::thread::Builder::new().name(name.to_owned()).spawn(move || {
-            while !stop.load(Relaxed) {
+            loop {
                 std::thread::sleep(beat.due.saturating_sub(beat.clock.elapsed()));
                 if !act(beat.begin()) {
                     break;

@@ -31,19 +31,20 @@ pub struct Raw {
     pub attachment: Vec<u8>,
     /// Whether the sample deletes the key.
     pub deletes: bool,
-    /// When it came, as wall time in seconds since 1970.
-    pub received: f64,
+    /// When it came, as wall time in nanoseconds since 1970.
+    pub received: u64,
 }
 
 impl Raw {
-    fn of(sample: &Sample) -> Self {
+    fn of(arrived: &Arrived) -> Self {
+        let Arrived { sample, at } = arrived;
         Self {
             key: sample.key_expr().as_str().to_owned(),
             encoding: sample.encoding().to_string(),
             payload: sample.payload().to_bytes().into_owned(),
             attachment: sample.attachment().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default(),
             deletes: sample.kind() == zenoh::sample::SampleKind::Delete,
-            received: crate::clock::wall(),
+            received: *at,
         }
     }
     /// The sequence, source and cause of the sample, if its attachment has them.
@@ -64,17 +65,23 @@ struct Cell {
     dropped: AtomicU64,
 }
 
+/// A sample, and when it came.
+struct Arrived {
+    sample: Sample,
+    at: u64,
+}
+
 #[derive(Default)]
 struct Queue {
-    samples: VecDeque<Sample>,
+    samples: VecDeque<Arrived>,
     bytes: usize,
 }
 
 impl Queue {
-    fn pop(&mut self) -> Option<Sample> {
-        let sample = self.samples.pop_front()?;
-        self.bytes -= sample.payload().len();
-        Some(sample)
+    fn pop(&mut self) -> Option<Arrived> {
+        let arrived = self.samples.pop_front()?;
+        self.bytes -= arrived.sample.payload().len();
+        Some(arrived)
     }
 }
 
@@ -97,21 +104,21 @@ impl Cell {
             }
         }
         queue.bytes += size;
-        queue.samples.push_back(sample);
+        queue.samples.push_back(Arrived { sample, at: crate::clock::wall_nanoseconds() });
         drop(queue);
         self.arrived.notify_one();
     }
-    fn oldest(&self) -> Option<Sample> {
+    fn oldest(&self) -> Option<Arrived> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner).pop()
     }
-    fn newest(&self) -> Option<Sample> {
+    fn newest(&self) -> Option<Arrived> {
         let mut queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
         let newest = queue.samples.pop_back();
         queue.samples.clear();
         queue.bytes = 0;
         newest
     }
-    async fn next(&self) -> Sample {
+    async fn next(&self) -> Arrived {
         loop {
             if let Some(sample) = self.oldest() {
                 return sample;
@@ -241,7 +248,8 @@ impl<M: Message> Inbox<M> {
         self.oversized.load(Relaxed)
     }
 
-    fn read(&self, sample: &Sample) -> Option<Heard<M>> {
+    fn read(&self, arrived: &Arrived) -> Option<Heard<M>> {
+        let sample = &arrived.sample;
         self.counters.received.fetch_add(1, Relaxed);
         match decode_as(&sample.encoding().to_string(), &sample.payload().to_bytes()) {
             Ok(message) => {
@@ -263,6 +271,12 @@ impl Tap {
         let sample = self.cell.next().await;
         self.counters.received.fetch_add(1, Relaxed);
         Raw::of(&sample)
+    }
+    /// The oldest sample that waits, if any.
+    pub fn take(&self) -> Option<Raw> {
+        let sample = self.cell.oldest()?;
+        self.counters.received.fetch_add(1, Relaxed);
+        Some(Raw::of(&sample))
     }
     /// Samples that were forgotten because nobody took them in time.
     pub fn dropped(&self) -> u64 {

@@ -116,7 +116,7 @@ impl Bar {
             _ => "over",
         };
         self.bar.set_message(format!(
-            "{phase}: {}/{} way points, {:.2} m left, {:.1} s",
+            "{phase}: {}/{} way points, {:.2} m from the last, {:.1} s",
             progress.reached, progress.points, progress.distance_left.0, progress.elapsed.0
         ));
     }

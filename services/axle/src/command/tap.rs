@@ -68,8 +68,10 @@ fn line(raw: &Raw, json: bool) -> serde_json::Result<String> {
             Ok(value) => (Some(value), None),
             Err(problem) => (None, Some(problem)),
         };
+        #[allow(clippy::cast_precision_loss, reason = "microseconds are enough for a line of text")]
+        let received = raw.received as f64 / 1e9;
         let mut line = serde_json::json!({
-            "key": raw.key, "type": schema(raw), "received": raw.received, "bytes": raw.payload.len(),
+            "key": raw.key, "type": schema(raw), "received": received, "bytes": raw.payload.len(),
             "meta": meta, "value": value,
         });
         if let Some(problem) = problem {

@@ -9,7 +9,7 @@ use axle_emulator::{Emulator, EmulatorParams};
 use axle_gate::{COMMANDS_PER_BEAT, Gate, Headline};
 use axle_mesh::{Counters, Inbox, Mesh, Publisher, Server};
 use axle_schema::codec::decode_as;
-use axle_schema::command::{AllStop, Command, Done, Enable, GateState, Lease, LeaseAsk, Release};
+use axle_schema::command::{AllStop, Command, Done, Enable, GateState, Lease, LeaseAsk, Motion, Release};
 use axle_schema::meta::Cause;
 use axle_schema::{EncodersData, InertialData, NavigatorData, Refusal, RobotId, Seconds, key};
 use std::sync::Arc;
@@ -26,15 +26,20 @@ pub(crate) async fn run(mut context: Context) -> anyhow::Result<()> {
     let gate = Gate::new(params.gate, &params.robot, mesh.boot(), None)?;
     let mut board = Board::new(&mesh, &robot, gate, &params)?;
     let stopping = Arc::new(AtomicBool::new(false));
-    let thread = mesh.beat_on_own_thread("gate", params.rates.beat, Arc::clone(&stopping), move |now| {
+    let is_stopping = Arc::clone(&stopping);
+    let thread = mesh.beat_on_own_thread("gate", params.rates.beat, move |now| {
+        let is_stopping = is_stopping.load(Relaxed);
+        if is_stopping {
+            board.gate.disable(now);
+        }
         board.beat(now);
-        true
+        // Who owns the wheels does not leave them turning.
+        !(is_stopping && board.gate.motion() == Motion::Standing)
     })?;
     let _visible = context.ready()?;
     context.stop.wait().await;
     stopping.store(true, Relaxed);
-    // The beat is a few milliseconds long; joining blocks for one at the most.
-    drop(thread.join());
+    tokio::task::spawn_blocking(move || drop(thread.join())).await?;
     Ok(())
 }
 

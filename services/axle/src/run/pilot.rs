@@ -3,7 +3,7 @@
 use super::Context;
 use crate::catalog::{self, Takes};
 use crate::params::load;
-use axle_mesh::{Mesh, Publisher, Retry, random_bits};
+use axle_mesh::{Asked, Mesh, Publisher, Retry, random_bits};
 use axle_pilot::{Journey, PilotParams};
 use axle_schema::command::Done;
 use axle_schema::key;
@@ -16,6 +16,8 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
+/// Poses that may wait for the next beat.
+const POSES: usize = 64;
 /// How often progress is said while nothing changes, and an unheard order is repeated.
 const PACE: Seconds = Seconds(0.1);
 
@@ -29,31 +31,37 @@ pub(crate) async fn run(mut context: Context) -> anyhow::Result<()> {
     let mesh = &context.mesh;
     let goes = mesh.server::<GoAsk, Accepted>(&key::GO.of(Some(&robot)))?;
     let cancels = mesh.server::<Cancel, Done>(&key::GO_CANCEL.of(Some(&robot)))?;
-    let poses = mesh.inbox(&key::POSE.of(&robot), 1)?;
+    let poses = mesh.inbox(&key::POSE.of(&robot), POSES)?;
     let (mut pilot, mut words, mut plans) = Pilot::new(mesh.clone(), robot, params)?;
     let _visible = context.ready()?;
     let mut beat = mesh.beat(PACE);
     loop {
-        let now = mesh.clock().now();
-        tokio::select! {
-            asked = goes.next() => {
-                let answer = asked.question().and_then(|ask| pilot.go(ask, now));
-                asked.reply(answer);
-            }
-            asked = cancels.next() => {
-                let answer = asked.question().and_then(|cancel| pilot.cancel(cancel.id, now));
-                asked.reply(answer);
-            }
-            heard = poses.next() => pilot.see(heard.message),
-            Some(said) = words.recv() => pilot.hear(&said, now),
-            Some((task, planned)) = plans.recv() => pilot.drive(task, planned, now),
-            at = beat.next() => pilot.beat(at),
-            () = context.stop.wait() => {
-                pilot.end(Phase::Failed(Refusal::Failed { why: "the pilot was stopped".into() }), now);
-                return Ok(());
-            }
+        let event = tokio::select! {
+            asked = goes.next() => Event::Go(asked),
+            asked = cancels.next() => Event::Cancel(asked),
+            Some(said) = words.recv() => Event::Said(said),
+            Some((task, planned)) = plans.recv() => Event::Planned(task, planned),
+            _ = beat.next() => Event::Beat,
+            () = context.stop.wait() => Event::Stop,
+        };
+        // Poses wait for whatever happens next: nothing is decided on an old one, and none wakes the process up.
+        while let Some(heard) = poses.take() {
+            pilot.see(heard.message);
+        }
+        if !pilot.handle(event, mesh.clock().now()) {
+            return Ok(());
         }
     }
+}
+
+/// What can happen to the pilot.
+enum Event {
+    Go(Asked<GoAsk, Accepted>),
+    Cancel(Asked<Cancel, Done>),
+    Said(CorrectorProgress),
+    Planned(TaskId, Result<Planned, Refusal>),
+    Beat,
+    Stop,
 }
 
 fn unknown_corrector(name: &str) -> Refusal {
@@ -125,6 +133,28 @@ impl Pilot {
             order: None,
         };
         Ok((pilot, words, plans))
+    }
+
+    /// Does what an event asks for; `false` when the pilot is to stop.
+    fn handle(&mut self, event: Event, now: Seconds) -> bool {
+        match event {
+            Event::Go(asked) => {
+                let answer = asked.question().and_then(|ask| self.go(ask, now));
+                asked.reply(answer);
+            }
+            Event::Cancel(asked) => {
+                let answer = asked.question().and_then(|cancel| self.cancel(cancel.id, now));
+                asked.reply(answer);
+            }
+            Event::Said(said) => self.hear(&said, now),
+            Event::Planned(task, planned) => self.drive(task, planned, now),
+            Event::Beat => self.beat(now),
+            Event::Stop => {
+                self.end(Phase::Failed(Refusal::Failed { why: "the pilot was stopped".into() }), now);
+                return false;
+            }
+        }
+        true
     }
 
     /// Takes a task. A running one is replaced.

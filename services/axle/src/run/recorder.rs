@@ -1,22 +1,25 @@
 //! The recorder as a process: everything that is said about a robot goes into an MCAP file.
 //!
-//! Samples wait in a bounded queue for a thread that may block on the disk; what does not fit is recorded as a gap.
-//! A full disk ends the recording, loudly, and nothing else.
+//! Samples wait in a bounded queue for the beat of a thread that may block on the disk; what does not fit is recorded
+//! as a gap. A full disk ends the recording, loudly, and nothing else.
 
 use super::Context;
 use crate::params::load;
-use axle_mesh::Raw;
-use axle_recorder::{Recorder, RecorderParams, Sample};
-use axle_schema::key;
+use anyhow::Context as _;
+use axle_mesh::Tap;
+use axle_mesh::clock::wall_nanoseconds;
+use axle_recorder::{RecordError, Recorder, RecorderParams, Sample, Totals};
+use axle_schema::{Seconds, key};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use tokio::sync::oneshot;
 
 /// Samples that may wait for the disk.
-const WAITING: usize = 8192;
-/// How long the writer waits for a sample before it looks whether a sync is due.
-const PAUSE: Duration = Duration::from_millis(100);
+const WAITING: usize = 16_384;
+/// How often the waiting samples are written: seldom, since waking up for each would cost more than writing it.
+const PACE: Seconds = Seconds(0.05);
 
 /// Records until it is told to stop.
 pub(crate) async fn run(mut context: Context) -> anyhow::Result<()> {
@@ -31,26 +34,85 @@ pub(crate) async fn run(mut context: Context) -> anyhow::Result<()> {
         ("robot".to_owned(), robot.to_string()),
         ("process".to_owned(), context.mesh.name()),
     ]);
-    let recorder = Recorder::create(&path, &about, &params, nanoseconds_now())?;
+    let recorder = Recorder::create(&path, &about, &params, wall_nanoseconds())?;
     let tap = context.mesh.tap(&key::everything(Some(&robot)), WAITING)?;
-    let (samples, waiting) = sync_channel(WAITING);
-    let writer =
-        std::thread::Builder::new().name("recorder".into()).spawn(move || write(recorder, &waiting))?;
+    let (ended, mut outcome) = oneshot::channel();
+    let stopping = Arc::new(AtomicBool::new(false));
+    let mut desk =
+        Desk { recorder: Some(recorder), tap, lost: 0, ended: Some(ended), stopping: Arc::clone(&stopping) };
+    // A thread of its own may wait for the disk.
+    let writing = context.mesh.beat_on_own_thread("recorder", PACE, move |_| desk.beat())?;
     let _visible = context.ready()?;
     tracing::info!("recording to {}", path.display());
-    let mut lost = Lost::default();
-    loop {
-        tokio::select! {
-            raw = tap.next() => {
-                if !lost.pass_on(&samples, raw, tap.dropped()) {
-                    break;
-                }
-            }
-            () = context.stop.wait() => break,
+    let early = tokio::select! {
+        outcome = &mut outcome => Some(outcome),
+        () = context.stop.wait() => None,
+    };
+    stopping.store(true, Relaxed);
+    let outcome = match early {
+        Some(outcome) => outcome,
+        None => outcome.await,
+    };
+    tokio::task::spawn_blocking(move || drop(writing.join())).await?;
+    let totals = outcome.context("the writer of the recording broke down")??;
+    tracing::info!("recorded {} samples, {} lost", totals.samples, totals.lost);
+    Ok(())
+}
+
+/// Where samples become a file.
+struct Desk {
+    recorder: Option<Recorder>,
+    tap: Tap,
+    /// Losses that are in the recording already.
+    lost: u64,
+    ended: Option<oneshot::Sender<Result<Totals, RecordError>>>,
+    stopping: Arc<AtomicBool>,
+}
+
+impl Desk {
+    /// Writes what waits; `false` when the recording has ended.
+    fn beat(&mut self) -> bool {
+        let is_last = self.stopping.load(Relaxed);
+        let written = self.write();
+        if written.is_ok() && !is_last {
+            return true;
         }
+        let Some(recorder) = self.recorder.take() else { return false };
+        // What was written before a full disk is closed as well as can be; the reason is told all the same.
+        let finished = recorder.finish();
+        let outcome = written.and(finished);
+        if let Some(ended) = self.ended.take() {
+            // Nobody waits any more when the process is ending in a hurry.
+            drop(ended.send(outcome));
+        }
+        false
     }
-    drop(samples);
-    writer.join().map_err(|_| anyhow::anyhow!("the writer of the recording broke down"))?
+
+    fn write(&mut self) -> Result<(), RecordError> {
+        let Some(recorder) = &mut self.recorder else { return Err(RecordError::Ended) };
+        let now = wall_nanoseconds();
+        let dropped = self.tap.dropped();
+        if dropped > self.lost {
+            recorder.gap("**", dropped - self.lost, now)?;
+            self.lost = dropped;
+        }
+        // What arrives meanwhile waits for the next beat, so that a flood cannot hold the flush up.
+        for _ in 0..WAITING {
+            let Some(raw) = self.tap.take() else { break };
+            let sample = Sample {
+                key: &raw.key,
+                encoding: &raw.encoding,
+                payload: &raw.payload,
+                attachment: (!raw.attachment.is_empty()).then_some(&raw.attachment[..]),
+                received: raw.received,
+            };
+            match recorder.write(sample) {
+                Err(fault) if !fault.is_final() => tracing::warn!("{fault}"),
+                other => other?,
+            }
+        }
+        recorder.flush_if_due(now).map(drop)
+    }
 }
 
 /// Where to record: the file of the parameters, or one named after the robot and the time.
@@ -59,7 +121,7 @@ pub(crate) async fn run(mut context: Context) -> anyhow::Result<()> {
 /// number.
 fn file(params: &RecorderParams, robot: &str) -> PathBuf {
     let Some(file) = &params.file else {
-        return params.directory.join(format!("{robot}-{}.mcap", nanoseconds_now() / 1_000_000));
+        return params.directory.join(format!("{robot}-{}.mcap", wall_nanoseconds() / 1_000_000));
     };
     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
     (2..=999)
@@ -67,70 +129,4 @@ fn file(params: &RecorderParams, robot: &str) -> PathBuf {
         .find(|numbered| !file.exists() || !numbered.exists())
         .filter(|_| file.exists())
         .unwrap_or_else(|| file.clone())
-}
-
-fn nanoseconds_now() -> u64 {
-    SystemTime::now()
-        .duration_since(UNIX_EPOCH)
-        .map_or(0, |since| u64::try_from(since.as_nanos()).unwrap_or(u64::MAX))
-}
-
-/// What goes to the writer.
-enum Entry {
-    Sample(Raw),
-    Gap(u64),
-}
-
-/// Counts what the queue could not take, and tells the writer as soon as it can.
-#[derive(Default)]
-struct Lost {
-    waiting: u64,
-    told: u64,
-}
-
-impl Lost {
-    /// Gives a sample to the writer; `false` when the writer has ended.
-    fn pass_on(&mut self, samples: &SyncSender<Entry>, raw: Raw, dropped: u64) -> bool {
-        self.waiting += dropped - self.told;
-        self.told = dropped;
-        if self.waiting > 0 && samples.try_send(Entry::Gap(self.waiting)).is_ok() {
-            self.waiting = 0;
-        }
-        match samples.try_send(Entry::Sample(raw)) {
-            Ok(()) => true,
-            Err(TrySendError::Full(_)) => {
-                self.waiting += 1;
-                true
-            }
-            Err(TrySendError::Disconnected(_)) => false,
-        }
-    }
-}
-
-fn write(mut recorder: Recorder, entries: &Receiver<Entry>) -> anyhow::Result<()> {
-    loop {
-        let now = nanoseconds_now();
-        let written = match entries.recv_timeout(PAUSE) {
-            Ok(Entry::Sample(raw)) => recorder.write(Sample {
-                key: &raw.key,
-                encoding: &raw.encoding,
-                payload: &raw.payload,
-                attachment: (!raw.attachment.is_empty()).then_some(&raw.attachment[..]),
-                received: now,
-            }),
-            Ok(Entry::Gap(lost)) => recorder.gap("axle/**", lost, now),
-            Err(RecvTimeoutError::Timeout) => Ok(()),
-            Err(RecvTimeoutError::Disconnected) => break,
-        };
-        for result in [written, recorder.flush_if_due(now).map(drop)] {
-            match result {
-                Ok(()) => {}
-                Err(fault) if fault.is_final() => return Err(fault.into()),
-                Err(fault) => tracing::warn!("{fault}"),
-            }
-        }
-    }
-    let totals = recorder.finish()?;
-    tracing::info!("recorded {} samples, {} lost", totals.samples, totals.lost);
-    Ok(())
 }
