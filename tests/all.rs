@@ -7,8 +7,6 @@ mod drive;
 #[cfg(test)]
 mod harness;
 #[cfg(test)]
-mod input;
-#[cfg(test)]
 mod life;
 #[cfg(test)]
 mod mesh;

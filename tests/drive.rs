@@ -1,1 +1,25 @@
-//! x
+//! A robot in software with every service as a process: it drives, and whatever dies or freezes, it stands.
+
+mod authority;
+mod faults;
+
+use crate::harness::{Process, Robot};
+
+/// A way to the far end of a room: long enough to do harm to whoever drives it.
+const FAR: &str = "4,0";
+
+impl Robot {
+    /// Starts `axle go` to the far end, and waits until the robot is fast.
+    async fn on_its_way(&self) -> Process {
+        let eyes = self.eyes().await;
+        let go = self.go(FAR);
+        eyes.sees_speed(0.3).await;
+        go
+    }
+    /// A short way from wherever it is now succeeds: everything works again.
+    async fn drives_again(&self) {
+        let pose = self.knows_where_it_is().await;
+        let way = format!("{:.3},{:.3}", pose.x.0 + 0.15, pose.y.0);
+        self.go(&way).ended().await.is(0, &["reached: 1 of 1 way points"]);
+    }
+}

@@ -9,7 +9,7 @@ mod robot;
 mod stranger;
 
 pub(crate) use process::{Ended, Process, children, is_alive};
-pub(crate) use robot::{Eyes, Robot, r1};
+pub(crate) use robot::{Eyes, Robot, SERVICES, r1, stands};
 pub(crate) use stranger::Stranger;
 
 use axle_mesh::{Mesh, Patience, Settings};

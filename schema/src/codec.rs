@@ -66,13 +66,22 @@ pub fn decode<M: Message>(bytes: &[u8]) -> Result<M, Refusal> {
         return Err(too_large::<M>(bytes.len()));
     }
     let mut rest = bytes;
-    let Traced(message) = ciborium::de::from_reader_with_recursion_limit::<Traced<M>, _>(&mut rest, DEPTH)
-        .map_err(|fault| Refusal::malformed(M::NAME, describe(&fault)))?;
+    // Keeping track of the path costs as much as reading: only bytes that are refused are read again with it.
+    let message: M = match ciborium::de::from_reader_with_recursion_limit(&mut rest, DEPTH) {
+        Ok(message) => message,
+        Err(fault) => return Err(explain::<M>(bytes, &fault)),
+    };
     if !rest.is_empty() {
         return Err(Refusal::malformed(M::NAME, format_args!("{} bytes follow the message", rest.len())));
     }
     message.check()?;
     Ok(message)
+}
+
+/// Says which field of refused bytes is at fault.
+fn explain<M: Message>(bytes: &[u8], fault: &ciborium::de::Error<std::io::Error>) -> Refusal {
+    let traced = ciborium::de::from_reader_with_recursion_limit::<Traced<M>, _>(bytes, DEPTH);
+    Refusal::malformed(M::NAME, describe(traced.as_ref().err().unwrap_or(fault)))
 }
 
 /// Decodes a sample whose encoding is known: as [`decode`], and refuses a sample that says it is something else.
@@ -128,12 +137,12 @@ fn shown(text: &str, most: usize) -> String {
     text.chars().take(most).map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect()
 }
 
-/// Reads `T` and puts the path of the faulty field before the reason: `points[2].x: NaN is not a finite number`.
-struct Traced<T>(T);
+/// Reads a `T`, forgets it, and puts the path of the faulty field before the reason: `points[2].x: NaN is not a finite number`.
+struct Traced<T>(std::marker::PhantomData<T>);
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for Traced<T> {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        serde_path_to_error::deserialize(from).map(Self).map_err(|fault| {
+        serde_path_to_error::deserialize(from).map(|_: T| Self(std::marker::PhantomData)).map_err(|fault| {
             let path = fault.path().to_string();
             if path == "." {
                 fault.into_inner()

@@ -3,7 +3,7 @@
 use super::{PATIENCE, Process, World, all_alive, declared, within};
 use axle_mesh::{Inbox, Mesh};
 use axle_schema::command::{GateState, Motion};
-use axle_schema::{EncodersData, NavigatorData, RobotId, Seconds, key};
+use axle_schema::{EncodersData, NavigatorData, Pose, RobotId, Seconds, key};
 use std::collections::BTreeMap;
 use std::future::Future;
 
@@ -35,9 +35,14 @@ impl Robot {
         let services = SERVICES.map(|name| (name, world.run(name))).into();
         let mesh = world.join().await;
         all_alive(&mesh, &SERVICES).await;
-        let poses = mesh.inbox(&key::POSE.of(&r1()), 1).expect("poses");
-        within(PATIENCE, "the robot knows where it is", poses.next()).await;
-        Self { router, services, mesh, world }
+        let robot = Self { router, services, mesh, world };
+        robot.knows_where_it_is().await;
+        robot
+    }
+    /// Waits for a pose, and says it.
+    pub(crate) async fn knows_where_it_is(&self) -> Pose {
+        let poses = self.mesh.inbox(&key::POSE.of(&r1()), 1).expect("poses");
+        within(PATIENCE, "the robot knows where it is", poses.next()).await.message.pose
     }
     pub(crate) fn service(&self, name: &str) -> &Process {
         &self.services[name]

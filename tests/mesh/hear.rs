@@ -176,7 +176,7 @@ async fn every_key_is_a_key_of_zenoh() {
     let meeting = Meeting::new().await;
     let hears = meeting.join("hears").await;
     let stranger = Stranger::join(&meeting.endpoint).await;
-    let robots = ["r1", "a-robot-with-a-name-of-32-letters", "all"];
+    let robots = ["r1", "robots-with-a-name-of-32-letters", "all"];
     let keys = key::TABLE.iter().flat_map(|entry| {
         let service = if entry.service == key::ANY_CORRECTOR { "d-corrector" } else { entry.service };
         robots.map(|robot| format!("axle/{robot}/{service}/{}", entry.name))
