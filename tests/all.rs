@@ -7,6 +7,8 @@ mod drive;
 #[cfg(test)]
 mod harness;
 #[cfg(test)]
+mod input;
+#[cfg(test)]
 mod life;
 #[cfg(test)]
 mod mesh;

@@ -1,6 +1,6 @@
 //! Services that die or freeze while the robot drives (fault matrix, rows 1, 2, 15, 31, 42).
 
-use crate::harness::{Eyes, Robot, all_alive, eventually, is_alive, stands};
+use crate::harness::{Eyes, Robot, all_alive, declared, eventually, is_alive, stands};
 use axle_schema::command::{BrakeCause, GateState, Motion};
 use axle_schema::meta::Cause;
 use axle_schema::{EncodersData, Message, Seconds};
@@ -118,6 +118,26 @@ async fn a_router_that_is_killed_in_mid_drive_stops_the_robot_and_nothing_has_to
     assert!(stands(&eyes.sees("the robot", |_| true).await));
     robot.drives_again().await;
     assert!(pids.into_iter().all(is_alive), "no service was restarted");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn whoever_owns_the_wheels_brakes_before_it_ends() {
+    let mut robot = Robot::new().await;
+    let mut go = robot.on_its_way().await;
+    let eyes = robot.eyes().await;
+    robot.service("emulator").tell(Signal::SIGTERM);
+    let ended = robot.services.get_mut("emulator").expect("the emulator").ended().await;
+    ended.is(0, &[]);
+    declared(&robot.mesh).await;
+    let truths = eyes.truths();
+    assert!(truths.iter().any(|truth| !stands(truth)), "it was told to end in mid drive");
+    let standing = std::iter::from_fn(|| eyes.states.take()).last().expect("a state").message;
+    assert_eq!(
+        (standing.motion, standing.enabled),
+        (Motion::Standing, false),
+        "its last words: {standing:?}"
+    );
+    go.ended().await.is(1, &["not reached"]);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -51,6 +51,10 @@ impl Ended {
 
 impl Process {
     pub(super) fn start(args: &[&str], directory: &Path) -> Self {
+        Self::with_env(args, &[], directory)
+    }
+    /// Starts the program in a directory with these variables, and without any other of Axle's own.
+    pub(crate) fn with_env(args: &[&str], variables: &[(&str, &str)], directory: &Path) -> Self {
         static NEXT: AtomicU32 = AtomicU32::new(0);
         let number = NEXT.fetch_add(1, Relaxed);
         let (out, err) = (directory.join(format!("{number}.out")), directory.join(format!("{number}.err")));
@@ -62,6 +66,7 @@ impl Process {
         }
         let child = command
             .args(args)
+            .envs(variables.iter().copied())
             .current_dir(directory)
             .env("TMPDIR", directory)
             .env("NO_COLOR", "1")

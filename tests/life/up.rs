@@ -1,8 +1,6 @@
 //! `axle up`: everything starts together, is kept alive, and ends together, however it ends.
 
-use crate::harness::{
-    Eyes, PATIENCE, Process, World, all_alive, children, eventually, is_alive, stands, within,
-};
+use crate::harness::{Eyes, PATIENCE, Process, World, all_alive, children, eventually, is_alive, within};
 use axle_mesh::Mesh;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -43,9 +41,8 @@ async fn ctrl_c_brakes_the_robot_and_leaves_no_process() {
     up.tell(Signal::SIGINT);
     up.ended().await.is(0, &["ending: the robot brakes, then all processes stop"]);
     are_gone(&pids, begun).await;
-    // The emulator ends last of all that matters: its last word is about a robot that stands.
-    let truths = eyes.truths();
-    assert!(truths.last().is_some_and(stands), "{:?}", truths.last());
+    // That the robot stands before its process ends cannot be seen from here, since the router ends as well:
+    // `drive::faults` has a test of that.
     go.ended().await.is(1, &[]);
     let left: Vec<_> = std::fs::read_dir(world.path()).expect("the directory").flatten().collect();
     let left: Vec<_> = left.iter().map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();

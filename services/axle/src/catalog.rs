@@ -2,11 +2,13 @@
 //!
 //! A new corrector is one file in `services/correctors` and one line in [`CATALOG`].
 
+use crate::params;
 use crate::run::{self, Context, Running};
 use axle_correctors::DCorrector;
 use axle_pathdriver::Pathdriver;
 use axle_pathfinder::Pathfinder;
 use axle_schema::contract::Params as _;
+use std::path::Path;
 
 /// For whom a service works when no robot is named.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,6 +38,8 @@ pub(crate) struct Entry {
     pub(crate) takes: Option<Takes>,
     /// Its parameters file with all defaults and explanations.
     pub(crate) params: &'static str,
+    /// Looks whether it can begin with such a file, without a mesh.
+    pub(crate) check: fn(Option<&Path>) -> anyhow::Result<()>,
     /// Runs it until it is told to stop.
     pub(crate) run: fn(Context) -> Running,
 }
@@ -48,6 +52,7 @@ impl Entry {
             scope: Scope::AllRobots,
             takes: None,
             params: <F::Params as axle_schema::contract::Params>::FILE,
+            check: params::check::<F::Params>,
             run: |context| Box::pin(run::functional::run::<F>(context)),
         }
     }
@@ -62,6 +67,7 @@ impl Entry {
             scope: Scope::OneRobot,
             takes: Some(takes),
             params: <C::Params as axle_schema::contract::Params>::FILE,
+            check: params::check::<C::Params>,
             run: |context| Box::pin(run::corrector::run::<C>(context)),
         }
     }
@@ -75,6 +81,7 @@ pub(crate) const CATALOG: &[Entry] = &[
         scope: Scope::OneRobot,
         takes: None,
         params: axle_pilot::PilotParams::FILE,
+        check: run::pilot::check,
         run: |context| Box::pin(run::pilot::run(context)),
     },
     Entry::functional::<Pathfinder>("pathfinder", "Turns way points into geometries."),
@@ -93,6 +100,7 @@ pub(crate) const CATALOG: &[Entry] = &[
         scope: Scope::OneRobot,
         takes: None,
         params: axle_emulator::EmulatorParams::FILE,
+        check: params::check::<axle_emulator::EmulatorParams>,
         run: |context| Box::pin(run::emulator::run(context)),
     },
     Entry {
@@ -101,6 +109,7 @@ pub(crate) const CATALOG: &[Entry] = &[
         scope: Scope::OneRobot,
         takes: None,
         params: axle_source::SourceParams::FILE,
+        check: params::check::<axle_source::SourceParams>,
         run: |context| Box::pin(run::source::run(context)),
     },
     Entry {
@@ -109,6 +118,7 @@ pub(crate) const CATALOG: &[Entry] = &[
         scope: Scope::OneRobot,
         takes: None,
         params: axle_navigator::NavigatorParams::FILE,
+        check: params::check::<axle_navigator::NavigatorParams>,
         run: |context| Box::pin(run::navigator::run(context)),
     },
     Entry {
@@ -117,6 +127,7 @@ pub(crate) const CATALOG: &[Entry] = &[
         scope: Scope::OneRobot,
         takes: None,
         params: axle_recorder::RecorderParams::FILE,
+        check: params::check::<axle_recorder::RecorderParams>,
         run: |context| Box::pin(run::recorder::run(context)),
     },
 ];

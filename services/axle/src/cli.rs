@@ -101,7 +101,7 @@ pub(crate) struct Up {
     /// The topology [default: one emulated robot and its planners]
     pub(crate) topology: Option<PathBuf>,
     /// Where the router listens, instead of where the topology says
-    #[arg(long, env = "AXLE_LISTEN", value_name = "tcp/HOST:PORT")]
+    #[arg(long, env = "AXLE_LISTEN", hide_env_values = true, value_name = "tcp/HOST:PORT")]
     pub(crate) listen: Option<String>,
 }
 
@@ -111,7 +111,7 @@ pub(crate) struct Run {
     /// The service; `axle run help` lists them
     pub(crate) service: String,
     /// Its parameters [default: those that `axle params SERVICE` prints]
-    #[arg(long, env = "AXLE_PARAMS", value_name = "FILE")]
+    #[arg(long, env = "AXLE_PARAMS", hide_env_values = true, value_name = "FILE")]
     pub(crate) params: Option<PathBuf>,
 }
 
@@ -121,7 +121,7 @@ pub(crate) struct Router {
     /// Where to listen; may be given several times
     #[arg(
         long,
-        env = "AXLE_LISTEN",
+        env = "AXLE_LISTEN", hide_env_values = true,
         value_name = "tcp/HOST:PORT",
         value_delimiter = ',',
         default_value = axle_router::DEFAULT_ENDPOINT

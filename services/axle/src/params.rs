@@ -23,6 +23,14 @@ pub(crate) fn load<P: Params>(file: Option<&Path>) -> anyhow::Result<P> {
     Ok(params)
 }
 
+/// Whether a service can begin with this file: said before it waits for a router.
+///
+/// # Errors
+/// As [`load`].
+pub(crate) fn check<P: Params>(file: Option<&Path>) -> anyhow::Result<()> {
+    load::<P>(file).map(drop)
+}
+
 /// Puts `over` on `base`, table by table.
 fn merge(base: &mut Table, over: Table) {
     for (name, value) in over {

@@ -57,6 +57,7 @@ pub(crate) async fn run(
     settings: &Settings,
     params: Option<PathBuf>,
 ) -> anyhow::Result<()> {
+    (entry.check)(params.as_deref())?;
     let mut stop = crate::signal::stop()?;
     let robot = match entry.scope {
         Scope::AllRobots => settings.robot.clone(),

@@ -11,23 +11,30 @@ use tracing_subscriber::EnvFilter;
 #[derive(Clone, Debug, Args)]
 pub(crate) struct Settings {
     /// The robot: 1 to 32 of a-z, 0-9 and -
-    #[arg(long, global = true, env = "AXLE_ROBOT", value_name = "ID")]
+    #[arg(long, global = true, env = "AXLE_ROBOT", hide_env_values = true, value_name = "ID")]
     pub(crate) robot: Option<RobotId>,
     /// The router to connect to; several are tried in turn
     #[arg(
         long,
         global = true,
-        env = "AXLE_CONNECT",
+        env = "AXLE_CONNECT", hide_env_values = true,
         value_name = "tcp/HOST:PORT",
         value_delimiter = ',',
         default_value = axle_router::DEFAULT_ENDPOINT
     )]
     pub(crate) connect: Vec<String>,
     /// The name of this computer [default: its host name]
-    #[arg(long, global = true, env = "AXLE_HOST", value_name = "NAME")]
+    #[arg(long, global = true, env = "AXLE_HOST", hide_env_values = true, value_name = "NAME")]
     pub(crate) host: Option<String>,
     /// What to log on stderr: error, warn, info, debug, trace, or per part (axle=debug,zenoh=warn)
-    #[arg(long, global = true, env = "AXLE_LOG", value_name = "LEVEL", default_value = "info")]
+    #[arg(
+        long,
+        global = true,
+        env = "AXLE_LOG",
+        hide_env_values = true,
+        value_name = "LEVEL",
+        default_value = "info"
+    )]
     pub(crate) log: String,
 }
 

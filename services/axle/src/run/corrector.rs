@@ -112,13 +112,13 @@ struct Voice {
 }
 
 impl Voice {
-    fn account(&self, task: TaskId, phase: Phase, account: Account, cause: Option<Cause>) {
+    /// Says how the task is; names itself as the cause of the command that follows.
+    fn account(&self, task: TaskId, phase: Phase, account: Account, cause: Option<Cause>) -> Option<Cause> {
         let Account { stamp, elapsed, fraction, due, real } = account;
         let fraction = fraction.clamp(0.0, 1.0);
         let progress = CorrectorProgress { task, phase, stamp, elapsed, fraction, due, real };
-        if let Err(refusal) = self.progress.put(&progress, cause) {
-            tracing::warn!("progress could not be said: {refusal}");
-        }
+        let said = self.progress.put(&progress, cause);
+        said.inspect_err(|refusal| tracing::warn!("progress could not be said: {refusal}")).ok()
     }
     /// Asks the gate for the wheels, beside the beat.
     fn ask_for_lease(&self, period: Seconds) -> oneshot::Receiver<Result<Lease, Refusal>> {
@@ -253,8 +253,8 @@ impl<C: Driven> Post<C> {
                 let ttl_ms = (self.period.0 * 3000.0).clamp(150.0, 1500.0) as u16;
                 let command = Command { boot: lease.boot, epoch: lease.epoch, seq: *seq, echo, ttl_ms, dwm };
                 let (task, account) = (*task, corrector.account());
-                self.voice.account(task, Phase::Running, account, self.senses.cause);
-                if let Err(refusal) = self.voice.commands.put(&command, self.senses.cause) {
+                let cause = self.voice.account(task, Phase::Running, account, self.senses.cause);
+                if let Err(refusal) = self.voice.commands.put(&command, cause) {
                     self.finish(Phase::Failed(refusal));
                 }
             }

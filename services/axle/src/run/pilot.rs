@@ -7,11 +7,13 @@ use axle_mesh::{Asked, Mesh, Publisher, Retry, random_bits};
 use axle_pilot::{Journey, PilotParams};
 use axle_schema::command::Done;
 use axle_schema::key;
+use axle_schema::meta::Cause;
 use axle_schema::task::{Accepted, Cancel, CorrectorProgress, GoAsk, Phase, PilotProgress, Task};
 use axle_schema::{
     Drive, DriveAsk, NavigatorData, Plan, PlanAsk, Pose, Refusal, RobotId, Seconds, TaskId, WayTask,
 };
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
@@ -23,10 +25,7 @@ const PACE: Seconds = Seconds(0.1);
 
 /// Pilots until it is told to stop.
 pub(crate) async fn run(mut context: Context) -> anyhow::Result<()> {
-    let params: PilotParams = load(context.params.as_deref())?;
-    if catalog::find(&params.corrector).is_none_or(|entry| entry.takes.is_none()) {
-        return Err(crate::out::usage(unknown_corrector(&params.corrector)));
-    }
+    let params = load_params(context.params.as_deref())?;
     let robot = context.one_robot()?;
     let mesh = &context.mesh;
     let goes = mesh.server::<GoAsk, Accepted>(&key::GO.of(Some(&robot)))?;
@@ -64,6 +63,20 @@ enum Event {
     Stop,
 }
 
+/// Reads the parameters; the corrector that they name must be one of the catalogue.
+fn load_params(file: Option<&Path>) -> anyhow::Result<PilotParams> {
+    let params: PilotParams = load(file)?;
+    if catalog::find(&params.corrector).is_none_or(|entry| entry.takes.is_none()) {
+        return Err(crate::out::usage(unknown_corrector(&params.corrector)));
+    }
+    Ok(params)
+}
+
+/// Whether the pilot can begin with this file.
+pub(crate) fn check(file: Option<&Path>) -> anyhow::Result<()> {
+    load_params(file).map(drop)
+}
+
 fn unknown_corrector(name: &str) -> Refusal {
     let got = name.chars().take(64).collect();
     Refusal::Unknown { what: "corrector".into(), got, known: catalog::corrector_names() }
@@ -96,6 +109,8 @@ struct Pilot {
     planned: mpsc::Sender<(TaskId, Result<Planned, Refusal>)>,
     /// The order that the corrector has not answered yet.
     order: Option<Task<Drive>>,
+    /// The latest of way, plan and movements of the task.
+    cause: Option<Cause>,
 }
 
 /// What correctors say, and what planners answer.
@@ -131,6 +146,7 @@ impl Pilot {
             planning: None,
             planned,
             order: None,
+            cause: None,
         };
         Ok((pilot, words, plans))
     }
@@ -171,7 +187,7 @@ impl Pilot {
         self.end(Phase::Replaced, now);
         let id = TaskId::from_random(random_bits());
         let way = Task { id, plan: ask.way.clone() };
-        self.say("the task", self.ways.put(&way, None).map(drop));
+        self.cause = self.say("the task", self.ways.put(&way, None));
         self.planning = Some(self.ask_planners(id, ask.way.clone(), seen.pose));
         self.journey = Some(Journey::begin(id, ask.way, corrector, seen.pose, now));
         self.say_progress(now);
@@ -233,9 +249,10 @@ impl Pilot {
         match planned {
             Ok(Planned { plan, drive }) => {
                 journey.drive(now);
-                self.say("the plan", self.plans.put(&Task { id, plan }, None).map(drop));
+                // Each names the one before it: the way caused the plan, the plan the movements, these the order.
+                self.cause = self.say("the plan", self.plans.put(&Task { id, plan }, self.cause));
                 let order = Task { id, plan: drive };
-                self.say("the movements", self.drives.put(&order, None).map(drop));
+                self.cause = self.say("the movements", self.drives.put(&order, self.cause));
                 self.order = Some(order);
                 self.repeat_order();
                 self.say_progress(now);
@@ -248,7 +265,7 @@ impl Pilot {
     fn repeat_order(&self) {
         let (Some(journey), Some(order)) = (&self.journey, &self.order) else { return };
         if let Some(line) = self.lines.get(journey.corrector()) {
-            self.say("the order", line.orders.put(order, None).map(drop));
+            self.say("the order", line.orders.put(order, self.cause));
         }
     }
 
@@ -283,18 +300,17 @@ impl Pilot {
         }
         let Some(journey) = &self.journey else { return };
         if let Some(line) = self.lines.get(journey.corrector()) {
-            self.say("the cancellation", line.cancels.put(&Cancel { id: journey.task() }, None).map(drop));
+            self.say("the cancellation", line.cancels.put(&Cancel { id: journey.task() }, None));
         }
     }
 
     fn say_progress(&self, now: Seconds) {
         let Some(journey) = &self.journey else { return };
-        self.say("progress", self.progress.put(&journey.progress(now), None).map(drop));
+        self.say("progress", self.progress.put(&journey.progress(now), None));
     }
 
-    fn say(&self, what: &str, said: Result<(), Refusal>) {
-        if let Err(refusal) = said {
-            tracing::warn!(robot = %self.robot, "{what} could not be said: {refusal}");
-        }
+    fn say(&self, what: &str, said: Result<Cause, Refusal>) -> Option<Cause> {
+        said.inspect_err(|refusal| tracing::warn!(robot = %self.robot, "{what} could not be said: {refusal}"))
+            .ok()
     }
 }
