@@ -140,6 +140,8 @@ def await_mesh(up, log):
     end = time.monotonic() + 30
     while time.monotonic() < end and up.poll() is None:
         if "processes are alive" in log.read_text():
+            # A reader of the page needs longer than this to type the first command.
+            time.sleep(1.0)
             return
         time.sleep(0.05)
     up.kill()

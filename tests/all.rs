@@ -13,4 +13,6 @@ mod life;
 #[cfg(test)]
 mod mesh;
 #[cfg(test)]
+mod tidy;
+#[cfg(test)]
 mod wire;

@@ -22,7 +22,10 @@ type Rule = fn(&File) -> Findings;
 fn prove(rule: Rule, broken: &[(&str, &str, &str)], right: &[(&str, &str)]) {
     for &(path, text, words) in broken {
         let findings = rule(&File::new(path, text));
-        assert!(findings.iter().any(|finding| finding.contains(words)), "{path} breaks the rule: {findings:?}");
+        assert!(
+            findings.iter().any(|finding| finding.contains(words)),
+            "{path} breaks the rule: {findings:?}"
+        );
     }
     for &(path, text) in right {
         assert_eq!(rule(&File::new(path, text)), Findings::new(), "{path} keeps the rule");

@@ -123,11 +123,11 @@ impl Drop for Process {
         let pid = self.pid();
         let below = children(pid);
         // What has ended already is what is wanted.
-        drop(killpg(raw(pid), Signal::SIGKILL));
+        let _ = killpg(raw(pid), Signal::SIGKILL);
         drop(self.child.wait());
         // The children of `axle up` stand in groups of their own; they end by themselves, but not while frozen.
         for child in below.into_iter().filter(|child| is_alive(*child)) {
-            drop(kill(raw(child), Signal::SIGKILL));
+            let _ = kill(raw(child), Signal::SIGKILL);
         }
         if std::thread::panicking() {
             eprintln!("--- {} ({pid})\n{}{}", self.what, self.out(), self.err());

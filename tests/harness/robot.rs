@@ -85,7 +85,7 @@ impl Eyes {
     }
     /// Waits until the robot stands, by a truth that comes from now on.
     pub(crate) async fn sees_rest(&self) -> NavigatorData {
-        drop(self.truth.latest());
+        while self.truth.take().is_some() {}
         self.sees("the robot stands", stands).await
     }
     /// Waits until the robot's clock shows `at`.

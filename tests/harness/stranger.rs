@@ -2,25 +2,14 @@
 
 use super::{PATIENCE, within};
 use axle_mesh::config::LINK;
-use axle_schema::codec::{decode_as, encoding_of};
-use axle_schema::{Message, Refusal};
+use axle_schema::codec::encoding_of;
+use axle_schema::{Refusal, decode};
 use zenoh::bytes::Encoding;
 use zenoh::query::ConsolidationMode;
 use zenoh::{Config, Session, Wait as _};
 
 pub(crate) struct Stranger {
     session: Session,
-}
-
-/// What a stranger is answered.
-#[derive(Debug)]
-pub(crate) enum Reply {
-    /// The bytes of an answer, and their encoding.
-    Answer(String, Vec<u8>),
-    /// A typed refusal.
-    Refused(Refusal),
-    /// Nothing, or nothing of Axle.
-    Nothing(String),
 }
 
 impl Stranger {
@@ -47,45 +36,22 @@ impl Stranger {
         put.congestion_control(zenoh::qos::CongestionControl::Block).wait().expect("said");
     }
 
-    /// Asks with these bytes, or without any.
-    pub(crate) async fn ask(&self, key: &str, encoding: &str, bytes: Option<Vec<u8>>) -> Reply {
+    /// Asks with these bytes, or without any, and is refused with words that hold all of these.
+    pub(crate) async fn is_refused(&self, key: &str, encoding: &str, bytes: Option<Vec<u8>>, words: &[&str]) {
         let get = self.session.get(key.to_owned()).consolidation(ConsolidationMode::None).timeout(PATIENCE);
         let get = if let Some(bytes) = bytes { get.payload(bytes) } else { get };
         let get = if encoding.is_empty() { get } else { get.encoding(Encoding::from(encoding)) };
         let replies = get.await.expect("asked");
-        let Ok(reply) = within(PATIENCE * 2, "a query ends", replies.recv_async()).await else {
-            return Reply::Nothing("no reply".into());
-        };
-        match reply.into_result() {
-            Ok(sample) => {
-                Reply::Answer(sample.encoding().to_string(), sample.payload().to_bytes().into_owned())
-            }
-            Err(error) => {
-                let (encoding, bytes) = (error.encoding().to_string(), error.payload().to_bytes());
-                if encoding == encoding_of::<Refusal>() {
-                    Reply::Refused(decode_as(&encoding, &bytes).expect("a refusal is well formed"))
-                } else {
-                    Reply::Nothing(String::from_utf8_lossy(&bytes).into_owned())
-                }
-            }
+        let what = format!("a reply of {key}, which should be: {words:?}");
+        let reply = within(PATIENCE * 2, &what, replies.recv_async()).await;
+        let reply = reply.unwrap_or_else(|_| panic!("nobody gave {what}"));
+        let Err(error) = reply.into_result() else { panic!("an answer instead of {what}") };
+        let bytes = error.payload().to_bytes();
+        assert_eq!(error.encoding().to_string(), encoding_of::<Refusal>(), "{what}");
+        let refusal: Refusal = decode(&bytes).expect("a refusal is well formed");
+        let text = refusal.to_string();
+        for word in words {
+            assert!(text.contains(word), "{key}: {text:?} does not say {word:?}");
         }
     }
-
-    /// Asks, and is refused with words that hold all of these.
-    pub(crate) async fn is_refused(&self, key: &str, encoding: &str, bytes: Option<Vec<u8>>, words: &[&str]) {
-        match self.ask(key, encoding, bytes).await {
-            Reply::Refused(refusal) => {
-                let text = refusal.to_string();
-                for word in words {
-                    assert!(text.contains(word), "{key}: {text:?} does not say {word:?}");
-                }
-            }
-            other => panic!("{key} should refuse ({words:?}), but: {other:?}"),
-        }
-    }
-}
-
-/// What well-formed bytes say they are.
-pub(crate) fn encoding<M: Message>() -> String {
-    encoding_of::<M>()
 }

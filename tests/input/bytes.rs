@@ -15,9 +15,10 @@ fn hostile(fine: &[u8], limit: usize) -> Vec<(Vec<u8>, &'static str)> {
         (Vec::new(), "malformed"),
         (fine[..fine.len() - 1].to_vec(), "end too early"),
         ([fine, &[0]].concat(), "follow the message"),
-        (vec![0x81; 200], "nested deeper"),
-        (vec![0xa1; 200], "malformed"),
-        (vec![0xff; 200], "malformed"),
+        (vec![0x81; 60], "malformed"),
+        ([&b"\xa1\x61?"[..], &[0x81; 60]].concat(), "malformed"),
+        (vec![0xa1; 60], "malformed"),
+        (vec![0xff; 60], "malformed"),
         // Lists and texts that say they are longer than all memory.
         ([&[0x9b], &u64::MAX.to_be_bytes()[..]].concat(), "malformed"),
         ([&[0x7b], &u64::MAX.to_be_bytes()[..]].concat(), "malformed"),
@@ -79,7 +80,8 @@ async fn pathfinder_answers_hostile_questions_with_refusals() {
     let nowhere = [b"\xa2\x61x\xfb", &f64::NAN.to_be_bytes()[..], b"\x61y\x00"].concat();
     let far = [b"\xa2\x61x\xfb", &1e9_f64.to_be_bytes()[..], b"\x61y\x00"].concat();
     for (bytes, words) in [
-        (points(1_000_000, origin), &["PlanAsk in bytes is too large", "262144"][..]),
+        ([&b"\xa1\x61?"[..], &[0x81; 100_000]].concat(), &["nested deeper"][..]),
+        (points(1_000_000, origin), &["PlanAsk in bytes is too large", "262144"]),
         (points(5000, origin), &["way points is too large: 5000, at most 4096"]),
         (points(1, &nowhere), &["points[0].x", "NaN is not a finite number"]),
         (points(1, &far), &["x of way point 1 is out of range"]),
@@ -119,13 +121,32 @@ async fn the_gate_obeys_no_stranger_and_counts_each() {
         })
         .await;
     assert_eq!(state.accepted, 0, "{state:?}");
-    let counted: u64 = state.rejected.values().sum();
-    let unread = refused(&robot.mesh, "emulator").await;
-    assert_eq!(state.rejected.get(&Reject::Malformed), Some(&(said - 2)), "{state:?}");
-    assert!(unread >= 2, "what is too large is not even read: {unread}");
-    assert!(counted + 2 >= said + 3, "{counted} and {unread} of {}", said + 3);
+    let count = |reject| state.rejected.get(&reject).copied().unwrap_or_default();
+    assert_eq!((count(Reject::Oversize), count(Reject::Malformed)), (2, said - 2), "{state:?}");
+    assert_eq!(state.rejected.values().sum::<u64>(), said + 3, "each has one reason: {state:?}");
+    assert_eq!(refused(&robot.mesh, "emulator").await, said + 3, "the process counts what its gate counts");
     assert!(eyes.truths().iter().all(stands), "no wheel moves");
     robot.go("0.2,0").ended().await.is(0, &["reached: 1 of 1 way points"]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_stop_that_cannot_be_read_stops_all_the_same() {
+    let robot = Robot::new().await;
+    let eyes = robot.eyes().await;
+    let stranger = Stranger::join(&robot.world.endpoint).await;
+    let mut go = robot.go("4,0");
+    eyes.sees_speed(0.3).await;
+    stranger.say("axle/r1/gate/stop", "text/plain", b"stop!".to_vec());
+    let state = eyes.hears("the drive is disabled", |state| !state.enabled).await;
+    assert_eq!(
+        (state.stop, &state.holder),
+        (None, &None),
+        "it has no name that an enable could quote: {state:?}"
+    );
+    eyes.sees_rest().await;
+    go.ended().await.is(1, &["the drive is disabled", "axle enable"]);
+    robot.world.done(&["enable"]).await.is(0, &["r1 may move"]);
+    robot.go("0,0").ended().await.is(0, &["reached: 1 of 1 way points"]);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -118,7 +118,8 @@ async fn a_wrong_parameter_file_is_refused_with_its_line_before_a_router_is_wait
     run(&world, "pilot", &directory).await.is(2, &[&directory, "cannot read"]);
     for (service, text, words) in [
         ("pathfinder", "merge = 0.1\nmerg = 0.1\n", &["line 2", "merg"][..]),
-        ("pathfinder", "merge = nan\n", &["merge in m", "NaN", "0 to 1"]),
+        ("pathfinder", "\nmerge = nan\n", &["line 2", "merge", "NaN is not a finite number"]),
+        ("pathfinder", "merge = 7\n", &["merge in m", "7", "0 to 1"]),
         ("pathfinder", "merge = \"far\"\n", &["line 1", "merge"]),
         ("pathdriver", "effort = 2\n", &["effort", "2", "0.05 to 1"]),
         ("pilot", "corrector = \"parrot\"\n", &["parrot", "known: d-corrector"]),

@@ -65,7 +65,8 @@ fn dead_links(page: &File, files: &[File]) -> Findings {
                 let folder = format!("{path}/");
                 files.iter().find(|file| file.path == path || file.path.starts_with(&folder))
             });
-            let leads = target.is_some_and(|target| heading.is_empty() || anchors(&target.text).contains(heading));
+            let leads =
+                target.is_some_and(|target| heading.is_empty() || anchors(&target.text).contains(heading));
             if !leads {
                 findings.push(page.at(index + 1, &format!("the link {link} leads nowhere")));
             }
@@ -86,7 +87,13 @@ fn links_between_files_lead_somewhere() {
     check("[a](../README.md#no-heading)", 1);
 
     let Repository { files } = Repository::read();
-    keep(files.iter().filter(|file| file.path.ends_with(".md")).flat_map(|page| dead_links(page, &files)).collect());
+    keep(
+        files
+            .iter()
+            .filter(|file| file.path.ends_with(".md"))
+            .flat_map(|page| dead_links(page, &files))
+            .collect(),
+    );
 }
 
 /// Folders of the top level and crates that a page does not name.
@@ -94,7 +101,8 @@ fn unnamed<'a>(page: &str, paths: impl Iterator<Item = &'a str> + Clone) -> Find
     let folders = paths.clone().filter_map(|path| path.split_once('/')).map(|(folder, _)| folder.to_owned());
     let crates = paths.filter_map(|path| path.strip_suffix("/Cargo.toml")).map(str::to_owned);
     let all: BTreeSet<String> = folders.chain(crates).collect();
-    let named = |folder: &String| page.contains(&format!("`{folder}/")) || page.contains(&format!("`{folder}`"));
+    let named =
+        |folder: &String| page.contains(&format!("`{folder}/")) || page.contains(&format!("`{folder}`"));
     let is_step = |folder: &String| folder == ".ci" && page.contains("`.ci/run");
     all.iter()
         .filter(|folder| !named(folder) && !is_step(folder))
@@ -125,8 +133,12 @@ struct Enforcers {
 impl Enforcers {
     fn of(repository: &Repository) -> Self {
         let steps = repository.file(".ci/run").text.lines().filter_map(step).map(str::to_owned).collect();
-        let tests = repository.sources().flat_map(|file| test_names(&super::lexer::Lexed::of(&file.text).code)).collect();
-        let manifest: toml::Table = repository.file("Cargo.toml").text.parse().expect("the manifest of the workspace");
+        let tests = repository
+            .sources()
+            .flat_map(|file| test_names(&super::lexer::Lexed::of(&file.text).code))
+            .collect();
+        let manifest: toml::Table =
+            repository.file("Cargo.toml").text.parse().expect("the manifest of the workspace");
         let lints = manifest["workspace"]["lints"].as_table().expect("lints").values();
         let lints = lints.filter_map(toml::Value::as_table).flat_map(toml::Table::keys).cloned().collect();
         Self { steps, tests, lints }
@@ -134,7 +146,11 @@ impl Enforcers {
     /// Whether `name` enforces something; an unknown step is wrong, any other word is just a word.
     fn knows(&self, name: &str) -> Result<bool, String> {
         if let Some(step) = name.strip_prefix(".ci/run ") {
-            return if self.steps.contains(step) { Ok(true) } else { Err(format!(".ci/run has no step {step}")) };
+            return if self.steps.contains(step) {
+                Ok(true)
+            } else {
+                Err(format!(".ci/run has no step {step}"))
+            };
         }
         let last = name.rsplit("::").next().unwrap_or(name);
         Ok(self.tests.contains(last) || self.lints.contains(last))
@@ -146,9 +162,11 @@ fn step(line: &str) -> Option<&str> {
     line.strip_prefix("step_").and_then(|rest| rest.split_once("() {")).map(|(name, _)| name)
 }
 
+/// The names of functions behind `#[test]` and `#[tokio::test(…)]`.
 fn test_names(code: &str) -> Vec<String> {
-    let behind = code.split("#[test]").skip(1).filter_map(|rest| rest.split_once("fn ")).map(|(_, rest)| rest);
-    behind.map(|rest| rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()).collect()
+    let behind = ["#[test]", "#[tokio::test"].into_iter().flat_map(|mark| code.split(mark).skip(1));
+    let names = behind.filter_map(|rest| rest.split_once("fn ")).map(|(_, rest)| rest);
+    names.map(|rest| rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()).collect()
 }
 
 /// Invariants of a page that name no check, or one that does not exist. An invariant is `**I7** …` up to the next one
@@ -184,10 +202,14 @@ fn unenforced(page: &str, enforcers: &Enforcers) -> Findings {
 #[test]
 fn every_invariant_names_a_check_that_exists() {
     let set = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
-    let enforcers = Enforcers { steps: set(&["doc"]), tests: set(&["it_holds"]), lints: set(&["unsafe_code"]) };
+    let enforcers =
+        Enforcers { steps: set(&["doc"]), tests: set(&["it_holds"]), lints: set(&["unsafe_code"]) };
     let check = |page: &str, words: &str| {
         let findings = unenforced(page, &enforcers).join("\n");
-        assert!(if words.is_empty() { findings.is_empty() } else { findings.contains(words) }, "{page:?}: {findings:?}");
+        assert!(
+            if words.is_empty() { findings.is_empty() } else { findings.contains(words) },
+            "{page:?}: {findings:?}"
+        );
     };
     check("**I1** a — `.ci/run doc`.\n**I2** b `x`, `gate::laws::it_holds`\n\n* **I3** c: `unsafe_code`", "");
     check("**I1** a — `.ci/run\ndoc`.", "");
@@ -196,7 +218,8 @@ fn every_invariant_names_a_check_that_exists() {
     check("**I1** a\n\n`it_holds`", "**I1** names no");
     check("**I1** `it_holds`\n**I3** `it_holds`", "**I3** stands where **I2**");
     check("# Invariants", "no line **I1**");
-    assert_eq!(test_names("#[test]\n#[a]\nfn b_c() {} fn d() {}"), ["b_c"]);
+    let code = "#[test]\n#[a]\nfn b_c() {} fn d() {} #[tokio::test(e = \"\")]\nasync fn f() {}";
+    assert_eq!(test_names(code), ["b_c", "f"]);
 
     let repository = Repository::read();
     keep(unenforced(&repository.file("ARCHITECTURE.md").text, &Enforcers::of(&repository)));

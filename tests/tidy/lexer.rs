@@ -69,12 +69,19 @@ fn token(bytes: &[u8], before: Option<u8>) -> (Kind, usize) {
     match bytes {
         [b'/', b'/', ..] => (Kind::Comment, find(bytes, b"\n").unwrap_or(bytes.len())),
         [b'/', b'*', ..] => (Kind::Comment, block_comment(bytes)),
-        [b'r' | b'b' | b'c', ..] if !in_word => raw_string(bytes).map_or((Kind::Code, 1), |end| (Kind::Text, end)),
+        [b'r' | b'b' | b'c', ..] if !in_word => {
+            raw_string(bytes).map_or((Kind::Code, 1), |end| (Kind::Text, end))
+        }
         [b'"', ..] => (Kind::Text, string(bytes)),
-        [b'\'', b'\\', escaped @ ..] => (Kind::Text, 3 + find(escaped.get(1..).unwrap_or(&[]), b"'").unwrap_or(0) + 1),
+        [b'\'', b'\\', escaped @ ..] => {
+            (Kind::Text, 3 + find(escaped.get(1..).unwrap_or(&[]), b"'").unwrap_or(0) + 1)
+        }
         // A character that is not followed by a quote is a lifetime.
         [b'\'', rest @ ..] => match find(&rest[..rest.len().min(5)], b"'") {
-            Some(end) if end > 0 && std::str::from_utf8(&rest[..end]).is_ok_and(|text| text.chars().count() == 1) => {
+            Some(end)
+                if end > 0
+                    && std::str::from_utf8(&rest[..end]).is_ok_and(|text| text.chars().count() == 1) =>
+            {
                 (Kind::Text, end + 2)
             }
             _ => (Kind::Code, 1),

@@ -90,7 +90,9 @@ fn mark_test_modules(files: &mut [File]) {
     let mut tests = BTreeSet::new();
     for file in files.iter().filter(|file| file.is_rust()) {
         let folder = match file.path.strip_suffix(".rs") {
-            Some(path) if path.ends_with("/lib") || path.ends_with("/main") => path.rsplit_once('/').map_or("", |p| p.0),
+            Some(path) if path.ends_with("/lib") || path.ends_with("/main") => {
+                path.rsplit_once('/').map_or("", |p| p.0)
+            }
             Some(path) => path,
             None => continue,
         };

@@ -81,7 +81,10 @@ fn spells_a_key(file: &File) -> Findings {
         return Findings::new();
     }
     let spoken = file.lexed().spoken;
-    lines_with(&spoken, "\"axle/").iter().map(|&line| file.at(line, "a key is spelt outside of key.rs")).collect()
+    lines_with(&spoken, "\"axle/")
+        .iter()
+        .map(|&line| file.at(line, "a key is spelt outside of key.rs"))
+        .collect()
 }
 
 #[test]
@@ -105,7 +108,8 @@ fn reaches_the_world(file: &File) -> Findings {
         return Findings::new();
     }
     let code = file.lexed().code;
-    let may = |what: &str| ALLOWED.iter().any(|(path, allowed)| file.path.starts_with(path) && what == *allowed);
+    let may =
+        |what: &str| ALLOWED.iter().any(|(path, allowed)| file.path.starts_with(path) && what == *allowed);
     let forbidden = WORLDLY.iter().filter(|(what, _)| !may(what));
     forbidden
         .flat_map(|(what, why)| {
@@ -160,7 +164,10 @@ fn nothing_is_left_unfinished_ignored_or_unwrapped() {
             ("tests/a.rs", "#[test]\n#[ignore = \"slow\"]\nfn a() {}", "a.rs:2: #[ignore"),
             ("services/gate/src/a.rs", "fn a() { b().unwrap(); }", ".unwrap()"),
         ],
-        &[("tests/a.rs", "fn a() { b().unwrap(); }"), ("services/gate/src/a.rs", "// todo!\nfn a() { b().unwrap_or(1) }")],
+        &[
+            ("tests/a.rs", "fn a() { b().unwrap(); }"),
+            ("services/gate/src/a.rs", "// todo!\nfn a() { b().unwrap_or(1) }"),
+        ],
     );
 }
 
@@ -170,7 +177,11 @@ fn says_no_purpose(file: &File) -> Findings {
         Some("py") => "\"\"\"",
         _ => return Findings::new(),
     };
-    if file.text.starts_with(begin) { Findings::new() } else { vec![file.at(1, "does not begin with its purpose")] }
+    if file.text.starts_with(begin) {
+        Findings::new()
+    } else {
+        vec![file.at(1, "does not begin with its purpose")]
+    }
 }
 
 #[test]
@@ -183,7 +194,8 @@ fn every_source_begins_with_its_purpose() {
 }
 
 fn is_too_long(file: &File) -> Findings {
-    let is_written = [".rs", ".py", ".md", ".toml", ".cddl", ".ci/run"].iter().any(|end| file.path.ends_with(end));
+    let is_written =
+        [".rs", ".py", ".md", ".toml", ".cddl", ".ci/run"].iter().any(|end| file.path.ends_with(end));
     let lines = file.text.lines().count();
     let too_long = is_written && lines > MOST_LINES;
     if too_long { vec![file.at(lines, "lines are too many: at most 600")] } else { Findings::new() }
@@ -204,7 +216,9 @@ fn is_a_drawer(file: &File) -> Findings {
         &["manager", "helper", "helpers", "util", "utils", "common", "misc", "handler", "handlers", "shared"];
     let words = file.path.split(['/', '.', '_', '-']);
     let drawers = words.filter(|word| DRAWERS.contains(&word.to_lowercase().as_str()));
-    drawers.map(|word| file.at(1, &format!("{word:?} is a drawer for anything; name what is in it"))).collect()
+    drawers
+        .map(|word| file.at(1, &format!("{word:?} is a drawer for anything; name what is in it")))
+        .collect()
 }
 
 #[test]

@@ -233,7 +233,7 @@ impl<M: Message> Inbox<M> {
             }
         }
     }
-    /// The oldest sample as it came, for a reader that counts faults itself.
+    /// The oldest sample as it came, for a reader that judges it itself.
     pub fn take_raw(&self) -> Option<Raw> {
         let sample = self.cell.oldest()?;
         self.counters.received.fetch_add(1, Relaxed);

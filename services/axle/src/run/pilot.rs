@@ -67,7 +67,9 @@ enum Event {
 fn load_params(file: Option<&Path>) -> anyhow::Result<PilotParams> {
     let params: PilotParams = load(file)?;
     if catalog::find(&params.corrector).is_none_or(|entry| entry.takes.is_none()) {
-        return Err(crate::out::usage(unknown_corrector(&params.corrector)));
+        let file = file.unwrap_or_else(|| Path::new("parameters"));
+        let refusal = unknown_corrector(&params.corrector);
+        return Err(crate::out::usage(format!("{}: {refusal}", file.display())));
     }
     Ok(params)
 }
