@@ -20,6 +20,6 @@ impl Robot {
     async fn drives_again(&self) {
         let pose = self.knows_where_it_is().await;
         let way = format!("{:.3},{:.3}", pose.x.0 + 0.15, pose.y.0);
-        self.go(&way).ended().await.is(0, &["reached: 1 of 1 way points"]);
+        self.reaches(&way).await;
     }
 }

@@ -8,7 +8,7 @@ mod process;
 mod robot;
 mod stranger;
 
-pub(crate) use process::{Ended, Process, children, is_alive};
+pub(crate) use process::{Ended, Process, children, driven, is_alive};
 pub(crate) use robot::{Eyes, Robot, SERVICES, r1, stands};
 pub(crate) use stranger::Stranger;
 

@@ -24,7 +24,7 @@ async fn services_that_start_before_their_router_say_so_and_come_alive_with_it()
     all_alive(&mesh, &SERVICES).await;
     let robot = Robot { router, services, mesh, world };
     robot.knows_where_it_is().await;
-    robot.go("0.3,0").ended().await.is(0, &["reached: 1 of 1 way points"]);
+    robot.reaches("0.3,0").await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -39,7 +39,7 @@ async fn a_router_that_is_replaced_finds_all_services_again() {
     for (name, service) in &robot.services {
         assert_eq!(alive[*name].pid, service.pid(), "{name} was not restarted");
     }
-    robot.go("0.3,0").ended().await.is(0, &["reached: 1 of 1 way points"]);
+    robot.reaches("0.3,0").await;
     let ps = robot.world.done(&["ps", "--json"]).await;
     let rows = ps.is(0, &[]).json();
     let rows = rows.as_array().expect("a list");

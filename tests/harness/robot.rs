@@ -1,6 +1,6 @@
 //! An emulated robot with everything that drives it, and eyes to watch it.
 
-use super::{PATIENCE, Process, World, all_alive, declared, within};
+use super::{PATIENCE, Process, World, all_alive, declared, driven, within};
 use axle_mesh::{Inbox, Mesh};
 use axle_schema::command::{GateState, Motion};
 use axle_schema::{EncodersData, NavigatorData, Pose, RobotId, Seconds, key};
@@ -50,6 +50,10 @@ impl Robot {
     /// Watches the robot from now on.
     pub(crate) async fn eyes(&self) -> Eyes {
         Eyes::of(&self.mesh).await
+    }
+    /// Drives to a point, and is told that it was reached.
+    pub(crate) async fn reaches(&self, point: &str) {
+        driven(|| self.go(point)).await.is(0, &["reached: 1 of 1 way points"]);
     }
     /// Starts `axle go`.
     pub(crate) fn go(&self, way: &str) -> Process {

@@ -1,12 +1,12 @@
 //! Bytes from strangers over a real mesh: the process stays, counts them, and answers the next good question.
 
 use crate::harness::{
-    Eyes, Meeting, PATIENCE, Process, Robot, Stranger, World, all_alive, eventually, r1, stands, within,
+    Meeting, PATIENCE, Process, Robot, Stranger, World, all_alive, eventually, r1, stands, within,
 };
 use axle_mesh::{Mesh, Retry};
 use axle_schema::codec::{Message, encoding_of};
 use axle_schema::command::{Command, Reject};
-use axle_schema::task::{Accepted, GoAsk, Task};
+use axle_schema::task::{GoAsk, Task};
 use axle_schema::{Boot, Drive, Dwm, Plan, PlanAsk, Refusal, Seconds, TaskId, Tick, WayTask, encode, key};
 
 /// Bytes that are no message of any kind, each with what a refusal says of them.
@@ -30,9 +30,8 @@ fn hostile(fine: &[u8], limit: usize) -> Vec<(Vec<u8>, &'static str)> {
 /// The refusals that a process counts.
 async fn refused(mesh: &Mesh, service: &str) -> u64 {
     let everybody = mesh.everybody(PATIENCE).await.expect("an answer");
-    let status =
-        everybody.into_iter().find_map(|(_, status)| status.filter(|status| status.service == service));
-    status.unwrap_or_else(|| panic!("{service} says how it is")).refused
+    let status = everybody.iter().find_map(|(_, status)| status.as_ref().filter(|status| status.service == service));
+    status.unwrap_or_else(|| panic!("{service} says how it is: {everybody:?}")).refused
 }
 
 /// Asks the same bytes in every wrong way; how many questions that were.
@@ -126,7 +125,7 @@ async fn the_gate_obeys_no_stranger_and_counts_each() {
     assert_eq!(state.rejected.values().sum::<u64>(), said + 3, "each has one reason: {state:?}");
     assert_eq!(refused(&robot.mesh, "emulator").await, said + 3, "the process counts what its gate counts");
     assert!(eyes.truths().iter().all(stands), "no wheel moves");
-    robot.go("0.2,0").ended().await.is(0, &["reached: 1 of 1 way points"]);
+    robot.reaches("0.2,0").await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -146,7 +145,7 @@ async fn a_stop_that_cannot_be_read_stops_all_the_same() {
     eyes.sees_rest().await;
     go.ended().await.is(1, &["the drive is disabled", "axle enable"]);
     robot.world.done(&["enable"]).await.is(0, &["r1 may move"]);
-    robot.go("0,0").ended().await.is(0, &["reached: 1 of 1 way points"]);
+    robot.reaches("0,0").await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -169,7 +168,7 @@ async fn leases_and_enables_of_strangers_are_refused_by_name() {
         asked += 1;
     }
     assert_eq!(refused(&robot.mesh, "emulator").await, asked);
-    robot.go("0.2,0").ended().await.is(0, &["reached: 1 of 1 way points"]);
+    robot.reaches("0.2,0").await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -197,22 +196,7 @@ async fn pilot_and_corrector_refuse_hostile_tasks_and_drive_the_next_good_one() 
     }
     counts(&robot.mesh, counted + 1).await;
 
-    let eyes = Eyes::of(&robot.mesh).await;
-    let accepted: Result<Accepted, Refusal> =
-        robot.mesh.ask(&key::GO, Some(&r1()), &ask, PATIENCE, Retry::Never).await;
-    let task = accepted.expect("a good task is taken").task;
-    let words = robot.mesh.inbox(&key::GO_PROGRESS.of(&r1()), 64).expect("progress");
-    let end = async {
-        loop {
-            let progress = words.next().await.message;
-            if progress.task == task && progress.phase.is_over() {
-                return progress;
-            }
-        }
-    };
-    let end = within(PATIENCE, "the task ends", end).await;
-    assert_eq!((end.phase, end.reached), (axle_schema::task::Phase::Done, 1));
-    eyes.sees_rest().await;
+    robot.reaches("0.2,0").await;
     for (name, service) in &robot.services {
         assert!(!service.err().contains("panicked"), "{name}: {}", service.err());
     }

@@ -1,6 +1,6 @@
 //! `axle demo`: the main job, as a person or a program meets it.
 
-use crate::harness::{World, children, eventually, is_alive};
+use crate::harness::{World, children, driven, eventually, is_alive};
 use nix::sys::signal::Signal;
 use std::path::Path;
 
@@ -50,7 +50,8 @@ fn finished(path: &Path) -> u64 {
 #[tokio::test(flavor = "multi_thread")]
 async fn the_demo_says_all_that_is_promised_as_json() {
     let world = World::new().await;
-    let demo = world.axle(&["demo", "--json", "--way", WAY, "--out", "shown", "--seed", "7"]).ended().await;
+    let demo =
+        driven(|| world.axle(&["demo", "--json", "--way", WAY, "--out", "shown", "--seed", "7"])).await;
     let json = demo.is(0, &["9 processes on tcp/127.0.0.1:"]).json();
     let keys: Vec<&str> = json.as_object().expect("an object").keys().map(String::as_str).collect();
     let promised = [
@@ -99,7 +100,7 @@ async fn the_demo_says_all_that_is_promised_as_json() {
 async fn the_demo_shows_a_table_to_people_and_may_be_repeated() {
     let world = World::new().await;
     for _ in 0..2 {
-        let demo = world.axle(&["demo", "--way", "0.2,0", "--robot", "r7"]).ended().await;
+        let demo = driven(|| world.axle(&["demo", "--way", "0.2,0", "--robot", "r7"])).await;
         demo.is(0, &["chart ", "recording "]);
         for words in ["reached", "yes", "final position error", "d-corrector", "refused"] {
             assert!(demo.out.contains(words), "{words:?} is missing in {}", demo.out);

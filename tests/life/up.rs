@@ -1,6 +1,8 @@
 //! `axle up`: everything starts together, is kept alive, and ends together, however it ends.
 
-use crate::harness::{Eyes, PATIENCE, Process, World, all_alive, children, eventually, is_alive, within};
+use crate::harness::{
+    Eyes, PATIENCE, Process, World, all_alive, children, driven, eventually, is_alive, within,
+};
 use axle_mesh::Mesh;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -108,5 +110,5 @@ async fn a_killed_emulator_comes_back_and_drives() {
     let poses = mesh.inbox(&axle_schema::key::POSE.of(&crate::harness::r1()), 1).expect("poses");
     let pose = within(PATIENCE, "a pose", poses.next()).await.message.pose;
     let way = format!("{:.3},{:.3}", pose.x.0 + 0.2, pose.y.0);
-    world.done(&["go", &way]).await.is(0, &["reached: 1 of 1 way points"]);
+    driven(|| world.tool(&["go", &way])).await.is(0, &["reached: 1 of 1 way points"]);
 }

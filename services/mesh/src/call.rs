@@ -23,6 +23,8 @@ const WAITING: usize = 256;
 const PAUSES: (Duration, Duration) = (Duration::from_millis(20), Duration::from_millis(200));
 /// The longest time one try may take, within the deadline of the caller.
 const TRY: Duration = Duration::from_secs(2);
+/// A try of less than this says nothing of a server that did not answer.
+const FAIR: Duration = Duration::from_millis(500);
 
 /// Whether a question may be asked again when nobody answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,25 +53,26 @@ impl Mesh {
         let key = call.of(robot);
         let end = Instant::now() + deadline;
         let mut pause = PAUSES.0;
+        // Whether the latest try that shows anything found somebody, who was too late.
+        let mut late = None;
         loop {
             let left = end.saturating_duration_since(Instant::now());
             let patience = if retry == Retry::Idempotent { left.min(TRY) } else { left };
-            let silence = match self.ask_once::<Q, A>(&key, &payload, patience).await? {
+            match self.ask_once::<Q, A>(&key, &payload, patience).await? {
                 Answer::Given(answer) => return Ok(answer),
-                Answer::None => None,
-                Answer::Late => Some(Refusal::TimedOut {
-                    what: call.service().to_owned(),
-                    seconds: deadline.as_secs_f64(),
-                }),
-            };
+                Answer::None => late = Some(false),
+                // A last try just before the deadline gets no time even for the news that nobody is there.
+                Answer::Late if patience >= FAIR || late.is_none() => late = Some(true),
+                Answer::Late => {}
+            }
             if retry == Retry::Never || Instant::now() + pause >= end {
-                return Err(silence.unwrap_or_else(|| {
-                    let service = call.service();
-                    Refusal::unavailable(
-                        service,
-                        format!("nobody answers at {key}; is `axle run {service}` up?"),
-                    )
-                }));
+                let service = call.service();
+                return Err(if late == Some(true) {
+                    Refusal::TimedOut { what: service.to_owned(), seconds: deadline.as_secs_f64() }
+                } else {
+                    let hint = format!("nobody answers at {key}; is `axle run {service}` up?");
+                    Refusal::unavailable(service, hint)
+                });
             }
             tokio::time::sleep(pause).await;
             pause = (pause * 2).min(PAUSES.1);

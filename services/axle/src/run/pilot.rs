@@ -22,6 +22,10 @@ use tokio::task::JoinHandle;
 const POSES: usize = 64;
 /// How often progress is said while nothing changes, and an unheard order is repeated.
 const PACE: Seconds = Seconds(0.1);
+/// Slower than this, in m/s and rad/s, the robot stands, and a plan may begin where it is.
+const REST: f64 = 1e-3;
+/// A robot whose task was taken away stands within this time, if nobody else drives it.
+const BRAKING: Seconds = Seconds(2.0);
 
 /// Pilots until it is told to stop.
 pub(crate) async fn run(mut context: Context) -> anyhow::Result<()> {
@@ -107,6 +111,10 @@ struct Pilot {
     drives: Publisher<Task<Drive>>,
     pose: Option<NavigatorData>,
     journey: Option<Journey>,
+    /// A way that waits for the robot to stand, and since when: a plan begins at rest, where the robot really is.
+    resting: Option<(WayTask, Seconds)>,
+    /// The task that ended last, and its corrector.
+    dismissed: Option<(String, TaskId)>,
     planning: Option<JoinHandle<()>>,
     planned: mpsc::Sender<(TaskId, Result<Planned, Refusal>)>,
     /// The order that the corrector has not answered yet.
@@ -145,6 +153,8 @@ impl Pilot {
             lines,
             pose: None,
             journey: None,
+            resting: None,
+            dismissed: None,
             planning: None,
             planned,
             order: None,
@@ -190,11 +200,33 @@ impl Pilot {
         let id = TaskId::from_random(random_bits());
         let way = Task { id, plan: ask.way.clone() };
         self.cause = self.say("the task", self.ways.put(&way, None));
-        self.planning = Some(self.ask_planners(id, ask.way.clone(), seen.pose));
-        self.journey = Some(Journey::begin(id, ask.way, corrector, seen.pose, now));
+        self.journey = Some(Journey::begin(id, ask.way.clone(), corrector, seen.pose, now));
+        self.resting = Some((ask.way, now));
+        self.plan_at_rest(now);
         self.say_progress(now);
         tracing::info!(task = %id, "task accepted");
         Ok(Accepted { task: id })
+    }
+
+    /// Has the task planned as soon as the robot stands.
+    fn plan_at_rest(&mut self, now: Seconds) {
+        let (Some((way, since)), Some(seen), Some(journey)) = (&self.resting, self.pose, &self.journey)
+        else {
+            return;
+        };
+        let stands = seen.twist.is_none_or(|twist| twist.v.0.abs() <= REST && twist.omega.0.abs() <= REST);
+        if stands {
+            self.planning = Some(self.ask_planners(journey.task(), way.clone(), seen.pose));
+            self.resting = None;
+        } else if now - *since > BRAKING {
+            let why = format!("the robot did not come to rest within {BRAKING}: somebody else drives it");
+            self.end(Phase::Failed(Refusal::Failed { why }), now);
+        } else if let Some((corrector, task)) = &self.dismissed
+            && let Some(line) = self.lines.get(corrector.as_str())
+        {
+            // A cancellation may be lost like every sample; it is repeated until the robot stands.
+            self.say("the cancellation", line.cancels.put(&Cancel { id: *task }, None));
+        }
     }
 
     /// Asks Pathfinder and Pathdriver beside the loop, which stays able to hear and to cancel.
@@ -272,6 +304,7 @@ impl Pilot {
     }
 
     fn beat(&mut self, now: Seconds) {
+        self.plan_at_rest(now);
         self.repeat_order();
         let Some(journey) = &mut self.journey else { return };
         if journey.phase().is_over() {
@@ -297,10 +330,12 @@ impl Pilot {
 
     fn dismiss(&mut self) {
         self.order = None;
+        self.resting = None;
         if let Some(planning) = self.planning.take() {
             planning.abort();
         }
         let Some(journey) = &self.journey else { return };
+        self.dismissed = Some((journey.corrector().to_owned(), journey.task()));
         if let Some(line) = self.lines.get(journey.corrector()) {
             self.say("the cancellation", line.cancels.put(&Cancel { id: journey.task() }, None));
         }
