@@ -39,7 +39,7 @@ mod shape;
 mod stretch;
 mod tables;
 
-pub use reckon::{arc, half_turn, point_and_shoot};
+pub use reckon::{arc, chord, half_turn, point_and_shoot};
 pub use shape::{Shape, shape};
 
 use double_double::DoubleDouble;

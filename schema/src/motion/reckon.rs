@@ -29,10 +29,26 @@
 #[must_use]
 pub fn arc(left: f64, right: f64, track: f64) -> (f64, f64, f64) {
     let (distance, half) = centre(left, right, track);
+    let (x, y) = chord(distance, 2.0 * half);
+    (x, y, 2.0 * half)
+}
+
+/// The displacement `(x, y)` in metres along an arc of the signed length `distance` in metres that turns by `theta`
+/// radians, in the frame of its start: the form that needs no radius and has no singularity (model.md, 1.3).
+///
+/// This is also the odometer whose turn comes from a gyroscope rather than from the wheels.
+///
+/// ```
+/// let (x, y) = axle_schema::motion::chord(2.0, 0.0);
+/// assert_eq!((x, y), (2.0, 0.0));
+/// ```
+#[must_use]
+pub fn chord(distance: f64, theta: f64) -> (f64, f64) {
+    let half = 0.5 * theta;
     let (sin, cos) = half.sin_cos();
     let sinc = if half == 0.0 { 1.0 } else { sin / half };
     let chord = distance * sinc;
-    (chord * cos, chord * sin, 2.0 * half)
+    (chord * cos, chord * sin)
 }
 
 /// The displacement as if the robot first turned on the spot and then went straight.
