@@ -116,6 +116,28 @@ impl EncodersSpan {
         };
         Dwm::new(start, end, self.duration)
     }
+    /// The movement that covers the span and accelerates as its neighbours, where there are any, let expect: the slope
+    /// of the mean speeds (see [`motion::slope`]). It is exact if the accelerations are the same in all of them, and
+    /// does not ring as a continuous chain does.
+    ///
+    /// # Errors
+    /// As [`EncodersSpan::to_dwm`].
+    pub fn to_accelerated_dwm(&self, before: Option<&Self>, after: Option<&Self>) -> Result<Dwm, Refusal> {
+        let Some(mean) = self.mean_speeds()? else { return self.to_dwm() };
+        // A neighbour without duration says nothing of speeds.
+        let speeds = |span: Option<&Self>| {
+            let span = span?;
+            Some((span.mean_speeds().ok()??, span.duration.0))
+        };
+        let (before, after) = (speeds(before), speeds(after));
+        let half_change = |side: fn(Sides<MetresPerSecond>) -> MetresPerSecond| {
+            let of = |(speeds, time): (Sides<MetresPerSecond>, f64)| (side(speeds).0, time);
+            let slope = motion::slope(before.map(of), of((mean, self.duration.0)), after.map(of));
+            MetresPerSecond(0.5 * slope * self.duration.0)
+        };
+        let change = Sides::new(half_change(|speeds| speeds.left), half_change(|speeds| speeds.right));
+        Dwm::new(mean.zip(change, |m, c| m - c), mean.zip(change, |m, c| m + c), self.duration)
+    }
     /// The mean speed of each wheel; none for a span of no time and no distance.
     fn mean_speeds(&self) -> Result<Option<Sides<MetresPerSecond>>, Refusal> {
         if self.duration.0 > 0.0 {
