@@ -272,6 +272,15 @@ impl Dwm {
     }
 }
 
+/// Where each movement ends, in the frame of its start: fills `ends` in the order of `movements`, as far as both reach.
+///
+/// Nothing is allocated, so that a caller may give each of its threads a part of both.
+pub fn fill_ends(movements: &[Dwm], track: Track, ends: &mut [Motion]) {
+    for (movement, end) in movements.iter().zip(ends) {
+        *end = movement.wheels(track).end();
+    }
+}
+
 impl Symmetric for Dwm {
     type Half = DwmHalf;
     fn split(self) -> Sides<DwmHalf> {

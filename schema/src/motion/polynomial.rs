@@ -32,7 +32,7 @@ const ZERO: DoubleDouble = DoubleDouble { hi: 0.0, lo: 0.0 };
 impl PolynomialWheels<'_> {
     /// The state of the robot at the time `t ≥ 0`, in the frame of its pose at the time 0; none if there are more than
     /// [`MAX_DEGREE`] + 1 coefficients, if `t` is negative, the track is not above 0, or a number is not finite, and if
-    /// the robot would turn by more than some 1e5 rad.
+    /// the robot would turn by more than some 1e4 rad.
     ///
     /// The position is within 1e-14 of the length of the way for headings up to 1000 rad, unless the coefficients
     /// cancel each other so much that `f64` coefficients themselves do not determine it. It is the sum of 16-node
@@ -99,8 +99,8 @@ const GROWTH: f64 = 2.041_666_666_666_667;
 /// 4e-17 of the way.
 const LARGEST_PHASE: f64 = 12.0;
 const LARGEST_SPEED: f64 = 1000.0;
-/// Halving the interval that often is more than any bounded phase needs.
-const SMALLEST_PANEL: f64 = 1.0 / 1_048_576.0;
+/// Limits the work: so many panels of this size are some 10 ms, and enough for more than 1e4 rad.
+const SMALLEST_PANEL: f64 = 1.0 / 16_384.0;
 
 impl Course {
     fn of(wheels: &PolynomialWheels<'_>, t: f64) -> Self {

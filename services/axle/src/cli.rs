@@ -50,7 +50,7 @@ pub(crate) enum Command {
         /// The service
         service: String,
     },
-    /// Measure the mesh
+    /// Measure the mesh, and the computation of motion
     #[command(subcommand)]
     Bench(Bench),
     /// Print a script that completes commands in a shell
@@ -244,6 +244,12 @@ pub(crate) struct Convert {
 /// The benches.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Bench {
+    /// The exact motion of a movement: time, error, and the price of Simpson's rule
+    Motion {
+        /// Print one JSON object
+        #[arg(long)]
+        json: bool,
+    },
     /// A query and a hop of Axle against bare Zenoh, side by side
     Mesh {
         /// Print one JSON object
@@ -264,6 +270,8 @@ pub(crate) enum Page {
     Services,
     /// docs/cli.md
     Cli,
+    /// docs/dead-reckoning.md
+    DeadReckoning,
 }
 
 fn way(text: &str) -> Result<WayTask, Refusal> {

@@ -37,6 +37,7 @@ pub(crate) async fn dispatch(cli: Cli) -> anyhow::Result<()> {
             let entry = catalog::find(&service).ok_or_else(|| unknown_service(&service))?;
             Ok(data(entry.params.trim_end())?)
         }
+        Command::Bench(crate::cli::Bench::Motion { json }) => bench::motion::motion(json),
         Command::Bench(crate::cli::Bench::Mesh { json, rounds }) => {
             bench::mesh(&settings, json, rounds).await
         }
