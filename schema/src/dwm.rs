@@ -3,8 +3,11 @@
 use crate::codec::Message;
 use crate::encoders::EncodersSpan;
 use crate::motion::{self, Motion, Wheels};
-use crate::navigator::{NavigatorSpan, Pose};
-use crate::{Metres, MetresPerSecond, MetresPerSecondSquared, Radians, Refusal, Seconds, Sides};
+use crate::navigator::{NavigatorData, NavigatorSpan, Pose, Twist};
+use crate::sides::{Symmetric, same_time};
+use crate::{
+    Metres, MetresPerSecond, MetresPerSecondSquared, Radians, RadiansPerSecond, Refusal, Seconds, Sides,
+};
 use serde::{Deserialize, Serialize};
 
 /// The fastest wheel Axle believes in, m/s; whatever asks for more is refused before anything is computed.
@@ -159,11 +162,7 @@ impl Dwm {
     /// As [`Dwm::new`], and when the durations differ.
     pub fn from_halves(halves: Sides<DwmHalf>) -> Result<Self, Refusal> {
         let Sides { left, right } = halves;
-        #[allow(clippy::float_cmp, reason = "the halves of one movement carry the same number")]
-        if left.duration.0 != right.duration.0 {
-            let got = format!("{} and {}", left.duration, right.duration);
-            return Err(Refusal::out_of_range("durations of two halves", got, "the same duration"));
-        }
+        same_time("duration", left.duration, right.duration)?;
         Self::new(Sides::new(left.v0, right.v0), Sides::new(left.v1, right.v1), left.duration)
     }
     /// Wheel speeds `t` after the start; `t` is clamped to the movement.
@@ -225,13 +224,43 @@ impl Dwm {
         let motion = self.motion_at(track, t);
         from.moved(Metres(motion.x), Metres(motion.y), Radians(motion.theta))
     }
+    /// The states of a robot that makes the movement from `from` on, for a chart: at its start, at its end, and in
+    /// equal parts of at most `step` between; at most a million parts. A step that is not above 0 asks for no parts.
+    ///
+    /// Each pose is exact, since it is computed from the start and not from the pose before it.
+    pub fn poses(
+        &self,
+        from: NavigatorData,
+        track: Track,
+        step: Seconds,
+    ) -> impl Iterator<Item = NavigatorData> + use<> {
+        let dwm = *self;
+        let wanted = (dwm.duration.0 / step.0).ceil();
+        let parts = if step.0 > 0.0 { wanted.clamp(1.0, 1e6) } else { 1.0 };
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "clamped to 1 to a million"
+        )]
+        let last = if dwm.duration.0 > 0.0 { parts as u32 } else { 0 };
+        (0..=last).map(move |part| {
+            let t =
+                if part == last { dwm.duration } else { dwm.duration * (f64::from(part) / f64::from(last)) };
+            let motion = dwm.motion_at(track, t);
+            let twist = Twist { v: MetresPerSecond(motion.v), omega: RadiansPerSecond(motion.omega) };
+            let pose = from.pose.moved(Metres(motion.x), Metres(motion.y), Radians(motion.theta));
+            NavigatorData { stamp: from.stamp + t, pose, twist: Some(twist), covariance: None }
+        })
+    }
     /// The name of the curve that is driven; a label, never a switch of the numerics.
     #[must_use]
     pub fn shape(&self, track: Track) -> motion::Shape {
         motion::shape(&self.wheels(track))
     }
 
-    const fn wheels(&self, track: Track) -> Wheels {
+    /// The raw numbers, for the routines of [`motion`].
+    #[must_use]
+    pub const fn wheels(&self, track: Track) -> Wheels {
         Wheels {
             v0l: self.start.left.0,
             v0r: self.start.right.0,
@@ -240,6 +269,25 @@ impl Dwm {
             duration: self.duration.0,
             track: track.get(),
         }
+    }
+}
+
+/// Where each movement ends, in the frame of its start: fills `ends` in the order of `movements`, as far as both reach.
+///
+/// Nothing is allocated, so that a caller may give each of its threads a part of both.
+pub fn fill_ends(movements: &[Dwm], track: Track, ends: &mut [Motion]) {
+    for (movement, end) in movements.iter().zip(ends) {
+        *end = movement.wheels(track).end();
+    }
+}
+
+impl Symmetric for Dwm {
+    type Half = DwmHalf;
+    fn split(self) -> Sides<DwmHalf> {
+        self.halves()
+    }
+    fn join(halves: Sides<DwmHalf>) -> Result<Self, Refusal> {
+        Self::from_halves(halves)
     }
 }
 

@@ -1,6 +1,11 @@
 //! Geometries: the shape of a path, without its speeds.
+//!
+//! These are the three that the paper has (section I.A). What a plan carries is a [`Geometry`], because Pathdriver and
+//! the G-corrector rest on the constant ratio of the wheel speeds that all three have (model.md, 4.4). The curves
+//! beyond the paper, for which a wheel must accelerate against the other, are a type of their own,
+//! [`Curve`](crate::Curve): a plan with a leg that no service can drive cannot be written down.
 
-use crate::navigator::{NavigatorSpan, Pose};
+use crate::navigator::{NavigatorData, NavigatorSpan, Pose};
 use crate::{Dwm, Metres, MetresPerSecond, Radians, Refusal, Seconds, Sides, Track, motion};
 use serde::{Deserialize, Serialize};
 
@@ -62,12 +67,12 @@ impl Geometry {
     /// The displacement of the whole geometry.
     #[must_use]
     pub fn navigator_span(&self) -> NavigatorSpan {
-        // Any track gives the same curve; with a track of 1 m the wheel distances are those of `motion::arc`.
         let (x, y, heading) = match *self {
             Self::Line { length } => (length.0, 0.0, 0.0),
             Self::Turn { angle } => (0.0, 0.0, angle.0),
             Self::Arc { radius, angle } => {
-                motion::arc(angle.0 * (radius.0 - 0.5), angle.0 * (radius.0 + 0.5), 1.0)
+                let (x, y) = motion::chord(radius.0 * angle.0, angle.0);
+                (x, y, angle.0)
             }
         };
         NavigatorSpan { duration: Seconds::ZERO, x: Metres(x), y: Metres(y), heading: Radians(heading) }
@@ -102,6 +107,21 @@ impl Geometry {
         } else {
             Ok(Dwm::rest(Seconds::ZERO))
         }
+    }
+
+    /// The states along the geometry, for a chart: those of its normalized movement (see [`Dwm::poses`]), so that the
+    /// stamps count the metres of the faster wheel from 0, and `step` is in these metres too.
+    ///
+    /// # Errors
+    /// Refuses numbers that are not finite.
+    pub fn poses(
+        &self,
+        from: Pose,
+        track: Track,
+        step: Seconds,
+    ) -> Result<impl Iterator<Item = NavigatorData> + use<>, Refusal> {
+        let from = NavigatorData { pose: from, ..NavigatorData::default() };
+        Ok(self.normalized_dwm(track)?.poses(from, track, step))
     }
 
     /// Refuses numbers that no robot can drive: not finite, or beyond 1e6 m or 1e6 rad.

@@ -9,26 +9,30 @@
 //!
 //! ```text
 //!  Geometry ──normalized_dwm──> Dwm ──encoders_span──> EncodersSpan <──spread── EncodersData
-//!     │                          │                        │  │   └──accumulate──> EncodersData
-//!     │                          │ <──────to_dwm──────────┘  │
-//!     └──navigator_span──┐       └──navigator_span──┐        └──navigator_span──┐
+//!     │ <───────geometry─────────┘ │                      │  │   └──accumulate──> EncodersData
+//!     │                            │ <──────to_dwm────────┘  │
+//!     └──navigator_span──┐         └─navigator_span─┐        └──navigator_span──┐
 //!                        └──────────────────────────┴──> NavigatorSpan <──spread── NavigatorData
 //!                                                              └─────accumulate──> NavigatorData
-//!  halves: Dwm <──> Sides<DwmHalf>, EncodersData ──> Sides<EncodersHalf>
+//!  charts: Geometry, Curve, Dwm ──poses──> NavigatorData …
+//!  halves: Dwm <──> Sides<DwmHalf>, EncodersData <──> Sides<EncodersHalf>, EncodersSpan <──> Sides<EncodersSpanHalf>
+//!  beyond the paper: Geometry ──> Curve (spirals and clothoids too) <──curve── Dwm, Curve ──normalized_dwm──> Dwm
 //! ```
 //!
 //! # Where to find what
 //!
-//! Words: [`unit`], [`sides`], [`dwm`], [`geometry`], [`way`], [`encoders`], [`navigator`], [`sensor`], and for the
+//! Words: [`unit`], [`sides`], [`dwm`], [`geometry`], [`curve`], [`way`], [`encoders`], [`navigator`], [`sensor`], and for the
 //! services [`plan`], [`task`], [`command`], [`window`], [`presence`]. How they are written: [`codec`], [`refusal`],
-//! [`meta`], [`key`]. What a service is: [`contract`]. Formulas: [`motion`], [`series`].
+//! [`meta`], [`key`]. What a service is: [`contract`]. Formulas: [`motion`], [`fit`], [`series`].
 
 pub mod codec;
 pub mod command;
 pub mod contract;
+pub mod curve;
 pub mod drivetrain;
 pub mod dwm;
 pub mod encoders;
+pub mod fit;
 pub mod geometry;
 pub mod id;
 pub mod key;
@@ -47,19 +51,22 @@ pub mod way;
 pub mod window;
 
 pub use codec::{Message, decode, encode};
+pub use curve::Curve;
 pub use drivetrain::Drivetrain;
 pub use dwm::{Dwm, DwmHalf, Track};
-pub use encoders::{EncodersData, EncodersHalf, EncodersSpan};
+pub use encoders::{EncodersData, EncodersHalf, EncodersSpan, EncodersSpanHalf};
+pub use fit::Tolerance;
 pub use geometry::Geometry;
 pub use id::{Boot, RobotId, StopId, TaskId, Tick};
 pub use navigator::{NavigatorData, NavigatorSpan, Pose, Twist};
 pub use plan::{Drive, DriveAsk, Leg, Plan, PlanAsk};
 pub use refusal::Refusal;
 pub use sensor::{Fix, HeadingFix, InertialData, Signals};
-pub use sides::Sides;
+pub use sides::{Sides, Symmetric};
 pub use task::Task;
 pub use unit::{
-    Duty, Metres, MetresPerSecond, MetresPerSecondSquared, Numbers, Radians, RadiansPerSecond, Seconds,
+    Duty, Metres, MetresPerSecond, MetresPerSecondSquared, Numbers, PerMetre, Radians, RadiansPerSecond,
+    Seconds,
 };
 pub use way::{WayPoint, WayTask};
 

@@ -32,6 +32,7 @@
 mod complex;
 mod double_double;
 mod endpoint;
+pub mod polynomial;
 mod quadrature;
 pub mod reckon;
 mod scale;
@@ -39,7 +40,7 @@ mod shape;
 mod stretch;
 mod tables;
 
-pub use reckon::{arc, half_turn, point_and_shoot};
+pub use reckon::{accelerated, arc, chord, half_turn, point_and_shoot, slope};
 pub use shape::{Shape, shape};
 
 use double_double::DoubleDouble;

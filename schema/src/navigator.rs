@@ -2,7 +2,7 @@
 
 use crate::codec::Message;
 use crate::unit::Numbers;
-use crate::{Metres, MetresPerSecond, Radians, RadiansPerSecond, Refusal, Seconds};
+use crate::{Metres, MetresPerSecond, Radians, RadiansPerSecond, Refusal, Seconds, Sides, Track};
 use serde::{Deserialize, Serialize};
 
 /// Position and heading in a plane: x forward, y left, heading counter-clockwise from +x (REP-103).
@@ -66,6 +66,21 @@ pub struct Twist {
     pub v: MetresPerSecond,
     /// Turn rate.
     pub omega: RadiansPerSecond,
+}
+
+impl Twist {
+    /// The wheel speeds that make the robot move like this.
+    #[must_use]
+    pub fn wheel_speeds(self, track: Track) -> Sides<MetresPerSecond> {
+        let turning = MetresPerSecond(self.omega.0 * (track.get() / 2.0));
+        Sides::new(self.v - turning, self.v + turning)
+    }
+    /// How the robot moves at these wheel speeds.
+    #[must_use]
+    pub fn of_wheels(speeds: Sides<MetresPerSecond>, track: Track) -> Self {
+        let Sides { left, right } = speeds;
+        Self { v: left * 0.5 + right * 0.5, omega: RadiansPerSecond((right - left).0 / track.get()) }
+    }
 }
 
 /// The pose of the robot at a stamp of the robot's clock, in the frame `odom` (REP-105).

@@ -1,5 +1,6 @@
 //! Symmetric data: what the left and the right wheel have each. Left comes before right, always.
 
+use crate::Refusal;
 use serde::{Deserialize, Serialize};
 
 /// A value for the left wheel and one for the right wheel.
@@ -27,5 +28,34 @@ impl<T> Sides<T> {
     /// Both, left first.
     pub fn both(self) -> [T; 2] {
         [self.left, self.right]
+    }
+}
+
+/// What can be divided into a left and a right part (the paper's symmetric data, section I.B).
+///
+/// `join` after `split` is the identity.
+pub trait Symmetric: Sized {
+    /// What one wheel has of it.
+    type Half;
+    /// The wheels apart.
+    fn split(self) -> Sides<Self::Half>;
+    /// Two wheels together.
+    ///
+    /// # Errors
+    /// Refuses halves of different times, and what no value of this type may hold.
+    fn join(halves: Sides<Self::Half>) -> Result<Self, Refusal>;
+}
+
+/// The time that both halves of one datum carry.
+pub(crate) fn same_time(what: &str, left: crate::Seconds, right: crate::Seconds) -> Result<(), Refusal> {
+    #[allow(clippy::float_cmp, reason = "the halves of one datum carry the very same number")]
+    if left.0 == right.0 {
+        Ok(())
+    } else {
+        Err(Refusal::out_of_range(
+            format!("{what} of two halves"),
+            format!("{left} and {right}"),
+            format!("the same {what}"),
+        ))
     }
 }

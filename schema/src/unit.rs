@@ -128,6 +128,8 @@ units! {
     RadiansPerSecond " rad/s";
     /// An acceleration.
     MetresPerSecondSquared " m/s²";
+    /// A curvature, to the left positive: the inverse of a signed radius.
+    PerMetre " 1/m";
 }
 
 impl Div<Seconds> for Metres {

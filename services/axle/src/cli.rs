@@ -43,12 +43,14 @@ pub(crate) enum Command {
     Enable(Json),
     /// Print any stream, decoded, one line a message
     Tap(Tap),
+    /// Convert JSON lines: movements to poses, encoder readings to spans, and every other arrow of the map
+    Convert(Convert),
     /// Print the parameters of a service with their explanations
     Params {
         /// The service
         service: String,
     },
-    /// Measure the mesh
+    /// Measure the mesh, and the computation of motion
     #[command(subcommand)]
     Bench(Bench),
     /// Print a script that completes commands in a shell
@@ -199,9 +201,55 @@ pub(crate) struct Tap {
     pub(crate) bw: bool,
 }
 
+/// Arguments of `axle convert`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Convert {
+    /// What comes in: dwm, geometry, encoders-data, encoders-span, navigator-data, navigator-span, halves
+    #[arg(required_unless_present = "map", requires = "to")]
+    pub(crate) from: Option<String>,
+    /// What goes out; beyond these, dwm can become a pose
+    pub(crate) to: Option<String>,
+    /// Print the map of conversions
+    #[arg(long)]
+    pub(crate) map: bool,
+    /// The distance between the wheels in metres, where a line has no "track"
+    #[arg(long, value_name = "METRES", allow_hyphen_values = true)]
+    pub(crate) track: Option<f64>,
+    /// The measurement to accumulate from, in JSON [default: zero]
+    #[arg(long, value_name = "JSON")]
+    pub(crate) start: Option<String>,
+    /// The time between two poses, in seconds
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.05, allow_hyphen_values = true)]
+    pub(crate) step: f64,
+    /// How far from a geometry a movement may be, in metres
+    #[arg(long, value_name = "METRES", default_value_t = 1e-6, allow_hyphen_values = true)]
+    pub(crate) position_tolerance: f64,
+    /// How far from the direction of a geometry a movement may head, in radians
+    #[arg(long, value_name = "RADIANS", default_value_t = 1e-6, allow_hyphen_values = true)]
+    pub(crate) heading_tolerance: f64,
+    /// The wheel speeds at the beginning of the first span, in m/s; each movement starts where the last ended
+    #[arg(
+        long,
+        value_name = "LEFT,RIGHT",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        conflicts_with = "chain"
+    )]
+    pub(crate) speeds: Option<Vec<f64>>,
+    /// Make one chain of all spans, without a jump of a speed and as smooth as can be
+    #[arg(long)]
+    pub(crate) chain: bool,
+}
+
 /// The benches.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Bench {
+    /// The exact motion of a movement: time, error, and the price of Simpson's rule
+    Motion {
+        /// Print one JSON object
+        #[arg(long)]
+        json: bool,
+    },
     /// A query and a hop of Axle against bare Zenoh, side by side
     Mesh {
         /// Print one JSON object
@@ -222,6 +270,8 @@ pub(crate) enum Page {
     Services,
     /// docs/cli.md
     Cli,
+    /// docs/dead-reckoning.md
+    DeadReckoning,
 }
 
 fn way(text: &str) -> Result<WayTask, Refusal> {

@@ -1,5 +1,6 @@
 //! The commands: one file each.
 
+mod convert;
 mod docs;
 pub(crate) mod go;
 mod ls;
@@ -31,10 +32,12 @@ pub(crate) async fn dispatch(cli: Cli) -> anyhow::Result<()> {
         Command::Stop(args) => stop::stop(&settings, args.json).await,
         Command::Enable(args) => stop::enable(&settings, args.json).await,
         Command::Tap(args) => tap::tap(&settings, &args).await,
+        Command::Convert(args) => convert::convert(&args),
         Command::Params { service } => {
             let entry = catalog::find(&service).ok_or_else(|| unknown_service(&service))?;
             Ok(data(entry.params.trim_end())?)
         }
+        Command::Bench(crate::cli::Bench::Motion { json }) => bench::motion::motion(json),
         Command::Bench(crate::cli::Bench::Mesh { json, rounds }) => {
             bench::mesh(&settings, json, rounds).await
         }

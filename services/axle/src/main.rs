@@ -3,6 +3,7 @@
 //! `main` only joins: it reads the command line, starts the log and hands over. Exit codes: 0 done, 1 failed, 2 the
 //! command line or a file is wrong.
 
+mod batch;
 mod bench;
 mod catalog;
 mod chart;

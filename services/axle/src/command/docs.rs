@@ -1,5 +1,7 @@
 //! Pages of the documentation that are generated from the code; CI compares them with the files in `docs/`.
 
+mod dead_reckoning;
+
 use crate::catalog::{CATALOG, Scope};
 use crate::cli::{Cli, Page};
 use axle_schema::key::{ANY_CORRECTOR, Kind, TABLE};
@@ -12,6 +14,7 @@ pub(crate) fn page(page: Page) -> String {
         Page::Keys => keys(),
         Page::Services => services(),
         Page::Cli => cli(),
+        Page::DeadReckoning => dead_reckoning::page(),
     }
 }
 
