@@ -1,6 +1,7 @@
 //! Dead reckoning beyond constant speeds: accelerations from neighbouring samples, and polynomials of time.
 
 #![allow(clippy::unwrap_used, reason = "a refusal where none is due ends the test")]
+#![allow(clippy::float_cmp, reason = "what is exactly zero is compared with zero")]
 
 use axle_schema::motion::polynomial::{MAX_DEGREE, PolynomialWheels};
 use axle_schema::motion::{Wheels, accelerated, arc, slope};

@@ -30,7 +30,8 @@ fn hostile(fine: &[u8], limit: usize) -> Vec<(Vec<u8>, &'static str)> {
 /// The refusals that a process counts.
 async fn refused(mesh: &Mesh, service: &str) -> u64 {
     let everybody = mesh.everybody(PATIENCE).await.expect("an answer");
-    let status = everybody.iter().find_map(|(_, status)| status.as_ref().filter(|status| status.service == service));
+    let status =
+        everybody.iter().find_map(|(_, status)| status.as_ref().filter(|status| status.service == service));
     status.unwrap_or_else(|| panic!("{service} says how it is: {everybody:?}")).refused
 }
 
