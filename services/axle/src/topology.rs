@@ -185,6 +185,6 @@ mod tests {
         check("[[services]]\nkind = \"navigator\"\nrobot = \"a/b\"", "a/b");
         let twice = "[[services]]\nkind = \"navigator\"\nrobot = \"r1\"\n";
         check(&twice.repeat(2), "stands twice");
-        check("services = []\n[robots.r1]\ntrack = -1", "track");
+        check("[[services]]\nkind = \"pathfinder\"\n[robots.r1]\ntrack = -1", "track");
     }
 }

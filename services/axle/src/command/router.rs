@@ -2,7 +2,14 @@
 
 use crate::cli::Router;
 use crate::out::usage;
+use anyhow::Context as _;
 use axle_router::{Router as Process, RouterFault, RouterSettings};
+use std::os::unix::process::CommandExt as _;
+
+/// Threads that read links. Zenoh 1.10 closes a link whose other end has frozen on one of them, which takes seconds;
+/// with its default of two, two frozen taps hold up everybody (measured: a pause of 5 s). It reads the number from the
+/// environment only.
+const THREADS: (&str, &str) = ("ZENOH_RUNTIME", "(rx: (worker_threads: 64))");
 
 pub(super) async fn router(args: Router) -> anyhow::Result<()> {
     let mut stop = crate::signal::stop()?;
