@@ -102,7 +102,6 @@ impl Message for PlanAsk {
     const NAME: &'static str = "PlanAsk";
     const LIMIT: usize = 256 * 1024;
     fn check(&self) -> Result<(), Refusal> {
-        self.start.map_or(Ok(()), Pose::check)?;
         self.way.check()
     }
 }
@@ -119,8 +118,10 @@ impl Message for DriveAsk {
     const LIMIT: usize = 1024 * 1024;
     fn check(&self) -> Result<(), Refusal> {
         self.robot.map_or(Ok(()), |robot| robot.check())?;
-        for speed in self.speeds.map_or([MetresPerSecond::ZERO; 2], Sides::both) {
-            within("wheel speed at the beginning in m/s", speed.0, -MAX_WHEEL_SPEED, MAX_WHEEL_SPEED)?;
+        let speeds = self.speeds.unwrap_or_default();
+        for (side, speed) in [("left", speeds.left), ("right", speeds.right)] {
+            let what = format!("{side} wheel speed at the beginning in m/s");
+            within(&what, speed.0, -MAX_WHEEL_SPEED, MAX_WHEEL_SPEED)?;
         }
         check_legs(&self.legs)
     }

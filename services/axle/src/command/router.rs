@@ -12,6 +12,14 @@ use std::os::unix::process::CommandExt as _;
 const THREADS: (&str, &str) = ("ZENOH_RUNTIME", "(rx: (worker_threads: 64))");
 
 pub(super) async fn router(args: Router) -> anyhow::Result<()> {
+    if std::env::var_os(THREADS.0).is_none() {
+        // The same process begins anew, with the variable.
+        let fault = std::process::Command::new(std::env::current_exe().context("find the axle program")?)
+            .args(std::env::args_os().skip(1))
+            .env(THREADS.0, THREADS.1)
+            .exec();
+        return Err(fault).context("begin anew with more threads");
+    }
     let mut stop = crate::signal::stop()?;
     let settings =
         RouterSettings { listen: args.listen, connect: args.link, insecure_lan: args.insecure_lan };
