@@ -11,10 +11,7 @@ const FAR: &str = "4,0";
 impl Robot {
     /// Starts `axle go` to the far end, and waits until the robot is fast.
     async fn on_its_way(&self) -> Process {
-        let eyes = self.eyes().await;
-        let go = self.go(FAR);
-        eyes.sees_speed(0.3).await;
-        go
+        self.eyes().await.under_way(|| self.go(FAR)).await
     }
     /// A short way from wherever it is now succeeds: everything works again.
     async fn drives_again(&self) {

@@ -64,8 +64,7 @@ async fn nobody_of_the_same_class_takes_the_wheels_and_the_holder_is_named() {
     let states = robot.mesh.inbox(&key::GATE_STATE.of(&r1()), 64).expect("states");
     declared(&robot.mesh).await;
     let holder = format!("d-corrector@lab/{}", robot.service("d-corrector").pid());
-    let mut go = robot.go("1.2,0");
-    robot.eyes().await.sees_speed(0.3).await;
+    let mut go = robot.eyes().await.under_way(|| robot.go("1.2,0")).await;
     for class in [Class::Corrector, Class::Background] {
         let ask = LeaseAsk { holder: "stranger@lab/1".into(), class, period: Seconds(0.05) };
         let granted =

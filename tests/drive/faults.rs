@@ -181,8 +181,7 @@ async fn a_recorder_that_is_killed_loses_no_more_than_a_second() {
     let params = robot.world.file("recorder.toml", "file = \"drive.mcap\"\n");
     let recorder = robot.world.tool(&["run", "recorder", "--params", &params]);
     all_alive(&robot.mesh, &["recorder"]).await;
-    let mut go = robot.go("2.4,0");
-    robot.eyes().await.sees_speed(0.3).await;
+    let mut go = robot.eyes().await.under_way(|| robot.go("2.4,0")).await;
     let begun = now();
     let eyes = robot.eyes().await;
     let from = eyes.sees("a moment", |_| true).await.stamp;

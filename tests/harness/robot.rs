@@ -87,6 +87,17 @@ impl Eyes {
     pub(crate) async fn sees_speed(&self, speed: f64) -> NavigatorData {
         self.sees(&format!("the robot drives at {speed} m/s"), |truth| velocity(truth) >= speed).await
     }
+    /// Starts what drives, and waits until the robot is fast; once more or twice if the machine was too busy for it.
+    pub(crate) async fn under_way(&self, start: impl Fn() -> Process) -> Process {
+        for _ in 0..3 {
+            let mut go = start();
+            tokio::select! {
+                _ = self.sees_speed(0.3) => return go,
+                ended = go.ended() => assert!(ended.was_late(), "{ended:?}"),
+            }
+        }
+        panic!("this machine is too busy for a robot to drive")
+    }
     /// Waits until the robot stands, by a truth that comes from now on.
     pub(crate) async fn sees_rest(&self) -> NavigatorData {
         while self.truth.take().is_some() {}

@@ -143,8 +143,7 @@ async fn a_stop_that_cannot_be_read_stops_all_the_same() {
     let robot = Robot::new().await;
     let eyes = robot.eyes().await;
     let stranger = Stranger::join(&robot.world.endpoint).await;
-    let mut go = robot.go("4,0");
-    eyes.sees_speed(0.3).await;
+    let mut go = eyes.under_way(|| robot.go("4,0")).await;
     stranger.say("axle/r1/gate/stop", "text/plain", b"stop!".to_vec());
     let state = eyes.hears("the drive is disabled", |state| !state.enabled).await;
     assert_eq!(

@@ -37,8 +37,7 @@ async fn ctrl_c_brakes_the_robot_and_leaves_no_process() {
     let world = World::new().await;
     let (mut up, mesh, pids) = up(&world).await;
     let eyes = Eyes::of(&mesh).await;
-    let mut go = world.tool(&["go", "4,0"]);
-    eyes.sees_speed(0.3).await;
+    let mut go = eyes.under_way(|| world.tool(&["go", "4,0"])).await;
     let begun = Instant::now();
     up.tell(Signal::SIGINT);
     up.ended().await.is(0, &["ending: the robot brakes, then all processes stop"]);
@@ -91,8 +90,7 @@ async fn a_killed_emulator_comes_back_and_drives() {
     let world = World::new().await;
     let (_up, mesh, _) = up(&world).await;
     let eyes = Eyes::of(&mesh).await;
-    let mut go = world.tool(&["go", "4,0"]);
-    eyes.sees_speed(0.3).await;
+    let mut go = eyes.under_way(|| world.tool(&["go", "4,0"])).await;
     let boot = eyes.hears("the gate's account", |_| true).await.boot;
     let alive = all_alive(&mesh, &["emulator"]).await;
     let pid = i32::try_from(alive["emulator"].pid).expect("a pid");
