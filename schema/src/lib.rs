@@ -21,8 +21,8 @@
 //!
 //! # Where to find what
 //!
-//! Words: [`unit`], [`sides`], [`dwm`], [`geometry`], [`curve`], [`way`], [`encoders`], [`navigator`], [`sensor`], and for the
-//! services [`plan`], [`task`], [`command`], [`window`], [`presence`]. How they are written: [`codec`], [`refusal`],
+//! Words: [`mod@unit`], [`sides`], [`dwm`], [`geometry`], [`curve`], [`way`], [`encoders`], [`navigator`], [`sensor`],
+//! and for the services [`plan`], [`task`], [`command`], [`window`], [`presence`]. How they are written: [`codec`], [`refusal`],
 //! [`meta`], [`key`]. What a service is: [`contract`]. Formulas: [`motion`], [`fit`], [`series`].
 
 pub mod codec;

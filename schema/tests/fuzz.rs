@@ -1,7 +1,7 @@
 //! Raw bytes as every number of the motion library: nothing panics, and nothing finite becomes NaN.
 //!
 //! A short run is part of every test run. A long one, with the same cases every time:
-//! `PROPTEST_CASES=6000000 PROPTEST_RNG_SEED=1 cargo test --release --locked -p axle-schema --test fuzz`.
+//! `PROPTEST_CASES=80000 PROPTEST_RNG_SEED=1 cargo test --locked -p axle-schema --test fuzz`.
 
 #![allow(clippy::unwrap_used, reason = "what a constructor took must convert")]
 

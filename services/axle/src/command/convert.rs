@@ -1,6 +1,6 @@
 //! `axle convert FROM TO`: the map of conversions on JSON lines, from stdin to stdout.
 //!
-//! Every arrow of the map is a line of [`ARROWS`](arrows::ARROWS); this file reads and writes lines. A line that cannot
+//! Every arrow of the map is a line of [`ARROWS`]; this file reads and writes lines. A line that cannot
 //! be converted is told on stderr with its number, and the others are converted all the same; then the exit code is 1.
 //! No mesh is needed. Numbers are written as the shortest decimals that read back as the same `f64`.
 
