@@ -2,6 +2,7 @@
 //! `check`, what the gate says of itself in `account`.
 
 use crate::GateParams;
+use crate::jerk::{Limits, Setpoint};
 use crate::wheels::{at_rest, braked, toward};
 use axle_schema::command::{BrakeCause, Class, Reject};
 use axle_schema::{Boot, Drivetrain, Dwm, MetresPerSecond, Refusal, Seconds, Sides, StopId};
@@ -37,6 +38,8 @@ pub struct Gate {
     pub(crate) course: Option<Course>,
     /// The setpoint of the latest beat.
     pub(crate) wheels: Sides<MetresPerSecond>,
+    /// The acceleration of each wheel at the latest beat, m/s²; only where the jerk is limited.
+    pub(crate) accelerations: Sides<f64>,
     pub(crate) cause: Option<BrakeCause>,
     pub(crate) accepted: u64,
     pub(crate) rejected: BTreeMap<Reject, u64>,
@@ -107,6 +110,7 @@ impl Gate {
             held: None,
             course: None,
             wheels: Sides::default(),
+            accelerations: Sides::default(),
             cause: None,
             accepted: 0,
             rejected: BTreeMap::new(),
@@ -128,11 +132,27 @@ impl Gate {
                 self.cause = Some(BrakeCause::Expired);
             }
         }
-        self.wheels = match &self.course {
-            Some(course) => toward(self.wheels, course.speeds_at(now), self.params.a_max * span),
-            None => braked(self.wheels, self.params.a_stop * span),
+        self.wheels = match (self.params.jerk, &self.course) {
+            (Some(jerk), _) => self.smoothed(now, span, jerk),
+            (None, Some(course)) => toward(self.wheels, course.speeds_at(now), self.params.a_max * span),
+            (None, None) => braked(self.wheels, self.params.a_stop * span),
         };
         self.wheels
+    }
+
+    /// The setpoint where the jerk is limited.
+    fn smoothed(&mut self, now: Seconds, span: Seconds, jerk: f64) -> Sides<MetresPerSecond> {
+        let (targets, steepest) = match &self.course {
+            Some(course) => (course.setpoints_at(now), self.params.a_max),
+            None => (Sides::default(), self.params.a_stop),
+        };
+        let limits = Limits { speed: self.wheel_speed.0, acceleration: steepest.0, jerk };
+        let setpoints = self
+            .wheels
+            .zip(self.accelerations, |speed, acceleration| Setpoint { speed: speed.0, acceleration })
+            .zip(targets, |setpoint, target| setpoint.toward(target, limits, span));
+        self.accelerations = setpoints.map(|setpoint| setpoint.acceleration);
+        setpoints.map(|setpoint| MetresPerSecond(setpoint.speed))
     }
 
     /// Takes the time of an event and ends what has run out by then; returns the time that the gate goes by.
@@ -164,6 +184,15 @@ impl Course {
     /// The speeds that it asks for; the last ones of what counts are held.
     fn speeds_at(&self, now: Seconds) -> Sides<MetresPerSecond> {
         self.dwm.speeds_at((now - self.since).min(self.lasts))
+    }
+    /// The same with their accelerations.
+    fn setpoints_at(&self, now: Seconds) -> Sides<Setpoint> {
+        let is_held = now - self.since >= self.lasts;
+        let gains = self.dwm.start().zip(self.dwm.end(), |v0, v1| (v1 - v0).0 / self.dwm.duration().0);
+        self.speeds_at(now).zip(gains, |speed, gain| Setpoint {
+            speed: speed.0,
+            acceleration: if is_held { 0.0 } else { gain },
+        })
     }
 }
 
@@ -244,6 +273,26 @@ mod tests {
         rig.command(&lease, drive(1.0, 1.0, 5.0)).expect("obeyed");
         let speeds = rig.gate.beat(rig.now);
         assert!((speeds.left.0 - 2.5 * MAX_BEAT.0).abs() < 1e-12, "as after 50 ms: {speeds:?}");
+    }
+
+    #[test]
+    fn with_a_jerk_limit_silence_ends_in_a_softer_braking_to_standstill() {
+        let params = GateParams { starts_enabled: true, jerk: Some(20.0), ..GateParams::default() };
+        let mut gate = Gate::new(params, &Drivetrain::default(), crate::rig::BOOT, None).expect("a gate");
+        let mut rig = Rig { gate: gate.clone(), ..Rig::enabled() };
+        let lease = rig.lease("a", Class::Corrector);
+        rig.command(&lease, drive(0.8, 0.8, 5.0)).expect("obeyed");
+        gate = rig.gate;
+        let (mut speeds, mut steepest, mut rate) = (vec![0.0], 0.0_f64, 0.0);
+        for beat in 1..=240_u32 {
+            let speed = gate.beat(Seconds(f64::from(beat) * 0.005)).left.0;
+            let acceleration = (speed - speeds[speeds.len() - 1]) / 0.005;
+            assert!((acceleration - rate).abs() <= 20.0 * 0.007 + 1e-9, "{rate} to {acceleration} m/s²");
+            (steepest, rate) = (steepest.max(acceleration.abs()), acceleration);
+            speeds.push(speed);
+        }
+        assert!(steepest <= 2.5 + 1e-9 && speeds.iter().copied().fold(0.0, f64::max) > 0.2);
+        assert_eq!((gate.motion(), speeds[240]), (Motion::Standing, 0.0));
     }
 
     #[test]

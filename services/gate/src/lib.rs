@@ -12,7 +12,8 @@
 //! * one holder at a time: every grant has a new epoch, and commands of older epochs are fenced;
 //! * a command proves by its echo of the robot's own clock that it is younger than `max_age`;
 //! * silence, the end of a movement, a lost lease and AllStop all end in the same bounded braking to standstill;
-//! * no setpoint differs from the one before by more than the acceleration limit allows;
+//! * no setpoint differs from the one before by more than the acceleration limit allows, and, where it is set, the
+//!   jerk limit;
 //! * AllStop latches, and only an [`Enable`] that quotes it lets wheels move again; nothing restarts by itself then.
 //!
 //! AllStop is an operational stop, not a certified emergency stop.
@@ -25,6 +26,7 @@ mod authority;
 mod check;
 mod event;
 mod gate;
+mod jerk;
 mod params;
 mod wheels;
 

@@ -22,6 +22,10 @@ pub struct GateParams {
     /// Largest acceleration of a wheel in setpoints and commands, 0.25 to 100 m/s². A bit more than the
     /// `robot.wheel_acceleration` that planners keep to, so that corrections have room, and never less.
     pub a_max: MetresPerSecondSquared,
+    /// Largest change of the acceleration of a setpoint, 1 to 1000 m/s³; left out, there is no such limit. For robots
+    /// that carry what may topple or spill. Every braking takes up to `2 a_stop / jerk` longer.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub jerk: Option<f64>,
     /// Whether the wheels may move right after a boot without an enable. Not for a robot of metal: after a crash
     /// and restart somebody may stand in front of it. A stored AllStop is stronger.
     pub starts_enabled: bool,
@@ -34,6 +38,7 @@ impl Default for GateParams {
             grace: Seconds(0.05),
             a_stop: MetresPerSecondSquared(2.0),
             a_max: MetresPerSecondSquared(2.5),
+            jerk: None,
             starts_enabled: false,
         }
     }
@@ -44,7 +49,8 @@ impl Bounds for GateParams {
         within("gate.max_age in s", self.max_age.0, 0.05, 1.0)?;
         within("gate.grace in s", self.grace.0, 0.0, 0.1)?;
         within("gate.a_stop in m/s²", self.a_stop.0, 0.25, 20.0)?;
-        within("gate.a_max in m/s²", self.a_max.0, 0.25, 100.0)
+        within("gate.a_max in m/s²", self.a_max.0, 0.25, 100.0)?;
+        self.jerk.map_or(Ok(()), |jerk| within("gate.jerk in m/s³", jerk, 1.0, 1000.0))
     }
 }
 
@@ -82,6 +88,8 @@ mod tests {
             GateParams { a_stop: MetresPerSecondSquared(f64::INFINITY), ..fine },
             GateParams { a_max: MetresPerSecondSquared(f64::NAN), ..fine },
             GateParams { a_max: MetresPerSecondSquared(1.0), ..fine },
+            GateParams { jerk: Some(0.0), ..fine },
+            GateParams { jerk: Some(f64::NAN), ..fine },
         ];
         for params in wrong {
             assert!(params.fits(&Drivetrain::default()).is_err(), "{params:?} is refused");

@@ -11,7 +11,7 @@ pub(crate) const BEAT: f64 = 0.005;
 pub(crate) struct Rig {
     pub(crate) gate: Gate,
     pub(crate) now: Seconds,
-    seq: u32,
+    pub(crate) seq: u32,
 }
 
 impl Rig {
