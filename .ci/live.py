@@ -173,11 +173,11 @@ def main():
         free.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
     path = f"{axle.parent}{os.pathsep}{os.environ['PATH']}"
-    environment = dict(os.environ, AXLE_CONNECT=endpoint, PATH=path, NO_COLOR="1")
+    environment = dict(os.environ, AXLE_CONNECT=endpoint, AXLE_STATE=str(where / "state"), PATH=path, NO_COLOR="1")
     log = where / "up.log"
     with open(log, "w") as words:
         command = [str(axle), "up", "--listen", endpoint]
-        up = subprocess.Popen(command, cwd=where, stdin=subprocess.DEVNULL, stdout=words, stderr=words)
+        up = subprocess.Popen(command, cwd=where, env=environment, stdin=subprocess.DEVNULL, stdout=words, stderr=words)
     await_mesh(up, log)
     try:
         play(page, where, environment)

@@ -216,6 +216,9 @@ pub struct GateState {
     /// The latest stop; an [`Enable`] must quote it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stop: Option<StopId>,
+    /// Whether the stop in force has been stored, so that it outlives a restart of the robot process.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub stored: bool,
     /// What the wheels are doing.
     pub motion: Motion,
     /// Why they brake, or last braked.
@@ -228,6 +231,10 @@ pub struct GateState {
     /// Commands refused since boot, by reason.
     #[serde(default)]
     pub rejected: BTreeMap<Reject, u64>,
+}
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "the shape that serde asks for")]
+const fn is_false(flag: &bool) -> bool {
+    !*flag
 }
 impl Message for GateState {
     const NAME: &'static str = "GateState";

@@ -76,6 +76,7 @@ impl Process {
             .envs(variables.iter().copied())
             .current_dir(directory)
             .env("TMPDIR", directory)
+            .env("AXLE_STATE", directory.join("state"))
             .env("NO_COLOR", "1")
             .env("AXLE_PARENT", "stdin")
             .stdin(Stdio::piped())

@@ -178,6 +178,7 @@ fn gate_states(all: &mut Vec<Golden>) {
         holder: Some("d-corrector@workstation/1234".into()),
         enabled: true,
         stop: Some(StopId(9)),
+        stored: false,
         motion: Motion::Driving,
         cause: Some(BrakeCause::Silence),
         wheels: Sides::new(MetresPerSecond(0.3), MetresPerSecond(0.31)),
@@ -194,9 +195,10 @@ fn gate_states(all: &mut Vec<Golden>) {
         ("disabled", Motion::Braking, Some(BrakeCause::Disabled)),
     ] {
         let rejected = std::collections::BTreeMap::new();
+        let stored = cause == Some(BrakeCause::AllStop);
         all.push(Golden::new(
             name,
-            GateState { holder: None, stop: None, motion, cause, rejected, ..state.clone() },
+            GateState { holder: None, stop: None, stored, motion, cause, rejected, ..state.clone() },
         ));
     }
 }

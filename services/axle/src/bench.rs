@@ -99,7 +99,7 @@ impl Bed {
         let (host, _) = topology.host(None)?;
         let log = Log::File(Arc::new(Mutex::new(std::fs::File::create(scratch.join("bench.log"))?)));
         let started = Instant::now();
-        let supervisor = Supervisor::start(&topology, host, &endpoint, &settings.log, &log)?;
+        let supervisor = Supervisor::start(&topology, host, &endpoint, &settings.log, None, &log)?;
         let alive = tokio::select! {
             alive = all_alive(settings, &endpoint, &supervisor) => alive,
             () = stop.wait() => Err(anyhow::anyhow!("ended before the mesh was up")),

@@ -38,7 +38,7 @@ pub(crate) enum Command {
     /// Drive a way, and show how far the robot is
     Go(Go),
     /// Stop the wheels at once; nothing moves until `axle enable`
-    Stop(Json),
+    Stop(Stop),
     /// Allow the wheels to move again after a stop
     Enable(Json),
     /// Print any stream, decoded, one line a message
@@ -67,6 +67,17 @@ pub(crate) enum Command {
     /// The other end of `axle bench mesh`
     #[command(hide = true)]
     BenchPeer,
+}
+
+/// `axle stop`.
+#[derive(Clone, Debug, clap::Args)]
+pub(crate) struct Stop {
+    /// Stop every robot of the mesh, whatever --robot says
+    #[arg(long)]
+    pub(crate) all: bool,
+    /// Print one JSON object a robot
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// Prints data for machines.

@@ -121,7 +121,7 @@ async fn start(
     let endpoint = format!("tcp/127.0.0.1:{port}");
     let (host, _) = topology.host(None)?;
     let started = Instant::now();
-    let supervisor = Supervisor::start(topology, host, &endpoint, &settings.log, log)?;
+    let supervisor = Supervisor::start(topology, host, &endpoint, &settings.log, None, log)?;
     let alive = tokio::select! {
         alive = all_alive(settings, &endpoint, &supervisor) => alive,
         () = stop.wait() => Err(anyhow::anyhow!("ended before the mesh was up")),

@@ -3,6 +3,7 @@
 pub(crate) mod corrector;
 pub(crate) mod emulator;
 pub(crate) mod functional;
+pub(crate) mod latch;
 pub(crate) mod navigator;
 pub(crate) mod pilot;
 pub(crate) mod recorder;
@@ -30,6 +31,8 @@ pub(crate) struct Context {
     pub(crate) robot: Option<RobotId>,
     /// Its parameters file.
     pub(crate) params: Option<PathBuf>,
+    /// Where an AllStop is kept, so that it outlives the process.
+    pub(crate) state: PathBuf,
     /// When to stop.
     pub(crate) stop: Stop,
 }
@@ -68,7 +71,8 @@ pub(crate) async fn run(
         mesh = joining => mesh?,
         () = stop.wait() => return Ok(()),
     };
-    let context = Context { mesh: mesh.clone(), service: entry.name, robot, params, stop };
+    let context =
+        Context { mesh: mesh.clone(), service: entry.name, robot, params, state: settings.state(), stop };
     let result = (entry.run)(context).await;
     mesh.leave().await;
     result

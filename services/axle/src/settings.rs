@@ -1,9 +1,10 @@
-//! The six settings of a process: robot, connect, listen, params, host, log. Each is a flag and an `AXLE_…` variable.
+//! The seven settings of a process: robot, connect, listen, params, host, state, log. Each is a flag and an `AXLE_…` variable.
 
 use crate::out::usage;
 use axle_mesh::{Mesh, Patience};
 use axle_schema::{RobotId, id::ALL};
 use clap::Args;
+use std::path::PathBuf;
 use std::time::Duration;
 use tracing_subscriber::EnvFilter;
 
@@ -26,6 +27,9 @@ pub(crate) struct Settings {
     /// The name of this computer [default: its host name]
     #[arg(long, global = true, env = "AXLE_HOST", hide_env_values = true, value_name = "NAME")]
     pub(crate) host: Option<String>,
+    /// Where the process that owns the wheels keeps an AllStop [default: the state directory of systemd or of the person]
+    #[arg(long, global = true, env = "AXLE_STATE", hide_env_values = true, value_name = "DIR")]
+    pub(crate) state: Option<PathBuf>,
     /// What to log on stderr: error, warn, info, debug, trace, or per part (axle=debug,zenoh=warn)
     #[arg(
         long,
@@ -50,6 +54,10 @@ impl Settings {
             read.or_else(|| std::env::var("HOSTNAME").ok())
                 .map_or_else(|| "localhost".into(), |name| name.trim().into())
         })
+    }
+    /// Where an AllStop is kept.
+    pub(crate) fn state(&self) -> PathBuf {
+        self.state.clone().unwrap_or_else(crate::run::latch::default_directory)
     }
     /// How this process is known on the mesh as `service`.
     pub(crate) fn mesh(&self, service: &str, robot: Option<&RobotId>) -> axle_mesh::Settings {

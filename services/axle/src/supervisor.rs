@@ -1,8 +1,8 @@
 //! One child process per service: started, watched, restarted with growing pauses, and ended together.
 //!
 //! The children stand in process groups of their own, so that Ctrl-C reaches the supervisor alone and it can end
-//! them in order: the correctors first, which give the wheels back, then the rest; the process that owns the wheels
-//! brakes before it ends. A child whose supervisor is killed sees the end of its stdin and ends too.
+//! them in order: the correctors first, which give the wheels back, then the rest, with the process that owns the wheels
+//! braking before it ends, then the recorder, which has heard all that, and the router last. A child whose supervisor is killed sees the end of its stdin and ends too.
 
 use crate::out::note;
 use crate::signal::PARENT;
@@ -24,9 +24,11 @@ use tokio::time::{Instant, timeout};
 /// The first and the longest pause before a restart; a child that lived for `STEADY` begins anew.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(200), Duration::from_secs(5));
 const STEADY: Duration = Duration::from_secs(10);
-/// How long correctors may take to give the wheels back, and everybody to end, before they are killed.
+/// How long correctors may take to give the wheels back, and everybody to end, before what is next is ended too.
 const GIVING_BACK: Duration = Duration::from_millis(600);
 const ENDING: Duration = Duration::from_millis(1200);
+/// Whoever has not ended so long after the last was told to is killed.
+const LAST: Duration = Duration::from_millis(500);
 
 /// Where the children's words go.
 #[derive(Clone)]
@@ -84,7 +86,8 @@ impl Drop for ParamsDirectory {
 }
 
 impl Supervisor {
-    /// Starts the router and the services of one computer.
+    /// Starts the router and the services of one computer. Stops are kept in `state`, or no longer than the supervisor
+    /// lives.
     ///
     /// # Errors
     /// When a parameter file cannot be written; children that cannot start are restarted and logged.
@@ -93,6 +96,7 @@ impl Supervisor {
         host: &str,
         endpoint: &str,
         level: &str,
+        state: Option<&Path>,
         log: &Log,
     ) -> anyhow::Result<Self> {
         let directory = std::env::temp_dir().join(format!("axle-{}", std::process::id()));
@@ -110,6 +114,8 @@ impl Supervisor {
             if let Some(robot) = &service.robot {
                 args.extend(["--robot".into(), robot.to_string()]);
             }
+            let state = state.unwrap_or(&params.0);
+            args.extend(["--state".into(), state.display().to_string()]);
             let table = topology.params_of(service)?;
             if !table.is_empty() {
                 let file = params.0.join(format!("{index}-{}.toml", service.kind));
@@ -138,25 +144,26 @@ impl Supervisor {
             .collect()
     }
 
-    /// Ends all children: correctors first, then the rest; within two seconds nothing is left.
+    /// Ends all children in their order; within three seconds nothing is left.
     pub(crate) async fn stop(self) {
-        let correctors = |child: &&Watched| child.job.name.ends_with("-corrector");
-        for child in self.children.iter().filter(correctors) {
-            child.tell(Signal::SIGTERM);
+        let stages: [(fn(&str) -> bool, Duration); 4] = [
+            (|name| name.ends_with("-corrector"), GIVING_BACK),
+            (|name| name != "recorder" && name != "router", ENDING),
+            (|name| name == "recorder", LAST),
+            (|_| true, LAST),
+        ];
+        for (is_due, patience) in stages {
+            let due: Vec<_> = self.children.iter().filter(|child| is_due(&child.job.name)).collect();
+            for child in &due {
+                child.tell(Signal::SIGTERM);
+            }
+            let deadline = Instant::now() + patience;
+            while due.iter().any(|child| child.pid().is_some()) && Instant::now() < deadline {
+                tokio::time::sleep(Duration::from_millis(10)).await;
+            }
         }
-        let deadline = Instant::now() + GIVING_BACK;
-        while self.children.iter().filter(correctors).any(|child| child.pid().is_some())
-            && Instant::now() < deadline
-        {
-            tokio::time::sleep(Duration::from_millis(10)).await;
-        }
-        for child in &self.children {
-            child.tell(Signal::SIGTERM);
-        }
-        let ending = Instant::now() + ENDING;
-        for child in self.children {
-            let Watched { watching, pid, .. } = child;
-            if timeout(ending.saturating_duration_since(Instant::now()), watching).await.is_err() {
+        for Watched { watching, pid, .. } in self.children {
+            if timeout(Duration::from_millis(100), watching).await.is_err() {
                 send(&pid, Signal::SIGKILL);
             }
         }

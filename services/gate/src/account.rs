@@ -28,6 +28,7 @@ impl Gate {
             holder: self.held.as_ref().map(|held| held.holder.clone()),
             enabled: self.permit == Permit::Enabled,
             stop: self.stop,
+            stored: false,
             motion: self.motion(),
             cause: self.cause,
             wheels: self.wheels,

@@ -21,7 +21,14 @@ pub(super) async fn up(settings: &Settings, args: Up) -> anyhow::Result<()> {
     check_free(&endpoint)?;
     let mut stop = crate::signal::stop()?;
     let started = Instant::now();
-    let supervisor = Supervisor::start(&topology, host, &endpoint, &settings.log, &Log::Prefixed)?;
+    let supervisor = Supervisor::start(
+        &topology,
+        host,
+        &endpoint,
+        &settings.log,
+        Some(&settings.state()),
+        &Log::Prefixed,
+    )?;
     let alive = all_alive(settings, &endpoint, &supervisor);
     let result = tokio::select! {
         alive = alive => alive,

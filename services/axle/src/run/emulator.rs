@@ -4,6 +4,7 @@
 //! braking. Zenoh's callbacks fill bounded queues; the beat empties them.
 
 use super::Context;
+use super::latch::Latch;
 use crate::params::load;
 use axle_emulator::{Emulator, EmulatorParams};
 use axle_gate::{COMMANDS_PER_BEAT, Gate, Headline};
@@ -23,8 +24,9 @@ pub(crate) async fn run(mut context: Context) -> anyhow::Result<()> {
     let params: EmulatorParams = load(context.params.as_deref())?;
     let robot = context.one_robot()?;
     let mesh = context.mesh.clone();
-    let gate = Gate::new(params.gate, &params.robot, mesh.boot(), None)?;
-    let mut board = Board::new(&mesh, &robot, gate, &params)?;
+    let latch = Latch::open(&context.state, &robot)?;
+    let gate = Gate::new(params.gate, &params.robot, mesh.boot(), latch.kept())?;
+    let mut board = Board::new(&mesh, &robot, gate, latch, &params)?;
     let stopping = Arc::new(AtomicBool::new(false));
     let is_stopping = Arc::clone(&stopping);
     let thread = mesh.beat_on_own_thread("gate", params.rates.beat, move |now| {
@@ -72,6 +74,7 @@ fn say(said: Result<(), Refusal>) {
 /// The emulated robot, its gate, and all its lines.
 struct Board {
     gate: Gate,
+    latch: Latch,
     emulator: Emulator,
     leases: Server<LeaseAsk, Lease>,
     releases: Server<Release, Done>,
@@ -82,17 +85,25 @@ struct Board {
     encoders: Paced<EncodersData>,
     inertial: Paced<InertialData>,
     truth: Paced<NavigatorData>,
-    said: Option<(Headline, Seconds)>,
-    /// Commands that were forgotten, and that were too large, as far as the gate has counted them.
+    said: Option<(Headline, bool, Seconds)>,
+    /// Commands that were forgotten, and that were too large, as far as the gate has counted them; stops likewise.
     unread: (u64, u64),
+    unread_stops: u64,
     counters: Arc<Counters>,
     obeyed: Option<Cause>,
 }
 
 impl Board {
-    fn new(mesh: &Mesh, robot: &RobotId, gate: Gate, params: &EmulatorParams) -> anyhow::Result<Self> {
+    fn new(
+        mesh: &Mesh,
+        robot: &RobotId,
+        gate: Gate,
+        latch: Latch,
+        params: &EmulatorParams,
+    ) -> anyhow::Result<Self> {
         Ok(Self {
             gate,
+            latch,
             emulator: Emulator::new(*params)?,
             leases: mesh.server(&key::LEASE.of(Some(robot)))?,
             releases: mesh.server(&key::RELEASE.of(Some(robot)))?,
@@ -105,6 +116,7 @@ impl Board {
             truth: Paced::new(mesh.publisher(&key::TRUTH.of(robot))?, params.rates.truth_hz),
             said: None,
             unread: (0, 0),
+            unread_stops: 0,
             counters: mesh.shared_counters(),
             obeyed: None,
         })
@@ -128,6 +140,7 @@ impl Board {
         self.hear_commands(now);
         let wheels = self.gate.beat(now);
         self.emulator.advance(now, wheels);
+        self.latch.keep(self.gate.latch());
         self.say_state(now);
         let Self { emulator, encoders, inertial, truth, obeyed, .. } = self;
         encoders.put(now, *obeyed, || emulator.encoders());
@@ -136,6 +149,12 @@ impl Board {
     }
 
     fn hear_stops(&mut self, now: Seconds) {
+        let unread = self.stops.oversized();
+        if unread > self.unread_stops {
+            self.unread_stops = unread;
+            tracing::warn!("an AllStop that is too large to be read disables the drive");
+            self.gate.disable(now);
+        }
         while let Some(raw) = self.stops.take_raw() {
             match decode_as::<AllStop>(&raw.encoding, &raw.payload) {
                 Ok(stop) => {
@@ -170,11 +189,14 @@ impl Board {
 
     /// Says the gate's state on change and once a second.
     fn say_state(&mut self, now: Seconds) {
-        let headline = self.gate.headline();
-        let is_news = self.said.is_none_or(|(said, at)| said != headline || now - at >= STATE_PERIOD);
+        let (headline, stored) = (self.gate.headline(), self.latch.is_stored());
+        let is_news = self
+            .said
+            .is_none_or(|(said, was, at)| (said, was) != (headline, stored) || now - at >= STATE_PERIOD);
         if is_news {
-            self.said = Some((headline, now));
-            say(self.state.put(&self.gate.state(now), None).map(drop));
+            self.said = Some((headline, stored, now));
+            let state = GateState { stored, ..self.gate.state(now) };
+            say(self.state.put(&state, None).map(drop));
         }
     }
 }
