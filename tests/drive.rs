@@ -2,6 +2,7 @@
 
 mod authority;
 mod faults;
+mod holder;
 mod latch;
 
 use crate::harness::{Process, Robot};

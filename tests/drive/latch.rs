@@ -37,7 +37,7 @@ async fn a_stop_that_is_too_large_to_be_read_stops_all_the_same() {
     let mut go = robot.on_its_way().await;
     let eyes = robot.eyes().await;
     let stranger = Stranger::join(&robot.world.endpoint).await;
-    stranger.say(key::STOP.of(&r1()).as_str(), "", &[0; 100_000]);
+    stranger.say(key::STOP.of(&r1()).as_str(), "", [0; 100_000]);
     let state = eyes.hears("the drive is disabled", |state| !state.enabled).await;
     assert_eq!(state.stop, None, "it has no name");
     go.ended().await.is(1, &["the drive is disabled"]);

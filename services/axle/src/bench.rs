@@ -5,6 +5,7 @@
 
 pub(crate) mod motion;
 mod process;
+pub(crate) mod stop;
 
 use crate::command::up::all_alive;
 use crate::out::{data, note, table};
@@ -70,6 +71,12 @@ pub(crate) async fn peer(settings: &Settings) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// An endpoint of this computer that nobody listens on.
+fn free_endpoint() -> anyhow::Result<String> {
+    let free = TcpListener::bind("127.0.0.1:0").and_then(|free| free.local_addr());
+    Ok(format!("tcp/{}", free.context("find a free port")?))
+}
+
 /// A mesh to measure on.
 struct Bed {
     supervisor: Supervisor,
@@ -85,11 +92,7 @@ impl Bed {
     async fn start(settings: &Settings, stop: &mut Stop) -> anyhow::Result<Self> {
         let scratch = std::env::temp_dir().join(format!("axle-bench-{}", std::process::id()));
         std::fs::create_dir_all(&scratch)?;
-        let port = TcpListener::bind("127.0.0.1:0")
-            .and_then(|free| free.local_addr())
-            .context("find a free port")?
-            .port();
-        let endpoint = format!("tcp/127.0.0.1:{port}");
+        let endpoint = free_endpoint()?;
         let mut topology = Topology::parse(topology::DEFAULT)?;
         for service in topology.services.iter_mut().filter(|service| service.kind == "recorder") {
             service.params.insert("file".into(), scratch.join("bench.mcap").display().to_string().into());

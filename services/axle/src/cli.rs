@@ -64,6 +64,9 @@ pub(crate) enum Command {
         /// The page
         page: Page,
     },
+    /// The process that `axle bench stop` kills
+    #[command(hide = true)]
+    BenchCommander,
     /// The other end of `axle bench mesh`
     #[command(hide = true)]
     BenchPeer,
@@ -260,6 +263,15 @@ pub(crate) enum Bench {
         /// Print one JSON object
         #[arg(long)]
         json: bool,
+    },
+    /// How soon the wheels brake when whoever commands them is killed, frozen or cut off
+    Stop {
+        /// Print one JSON object
+        #[arg(long)]
+        json: bool,
+        /// How many faults to inject
+        #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u32).range(6..100_000))]
+        injections: u32,
     },
     /// A query and a hop of Axle against bare Zenoh, side by side
     Mesh {

@@ -41,12 +41,16 @@ pub(crate) async fn dispatch(cli: Cli) -> anyhow::Result<()> {
         Command::Bench(crate::cli::Bench::Mesh { json, rounds }) => {
             bench::mesh(&settings, json, rounds).await
         }
+        Command::Bench(crate::cli::Bench::Stop { json, injections }) => {
+            bench::stop::stop(&settings, json, injections).await
+        }
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "axle", &mut script);
             Ok(data(String::from_utf8_lossy(&script).trim_end())?)
         }
         Command::Docs { page } => Ok(data(docs::page(page).trim_end())?),
+        Command::BenchCommander => bench::stop::command(&settings).await,
         Command::BenchPeer => bench::peer(&settings).await,
     }
 }

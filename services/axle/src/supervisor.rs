@@ -52,6 +52,9 @@ impl Log {
     }
 }
 
+/// Who is told to end together, by name, and how long they may take.
+type Stage = (fn(&str) -> bool, Duration);
+
 /// What to run.
 #[derive(Clone, Debug)]
 pub(crate) struct Job {
@@ -146,7 +149,7 @@ impl Supervisor {
 
     /// Ends all children in their order; within three seconds nothing is left.
     pub(crate) async fn stop(self) {
-        let stages: [(fn(&str) -> bool, Duration); 4] = [
+        let stages: [Stage; 4] = [
             (|name| name.ends_with("-corrector"), GIVING_BACK),
             (|name| name != "recorder" && name != "router", ENDING),
             (|name| name == "recorder", LAST),
