@@ -214,6 +214,9 @@ pub struct MotorReading {
     pub boot: Boot,
     /// Its clock.
     pub stamp: Seconds,
+    /// The power that the motor has now, where there is a motor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub power: Option<Duty>,
     /// The distance that the wheel has covered since the boot, where there is an encoder.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distance: Option<Metres>,
@@ -291,4 +294,54 @@ impl Message for MotorReading {
 
 fn check_hold(hold: Option<Seconds>) -> Result<(), Refusal> {
     hold.map_or(Ok(()), |hold| within("hold in s", hold.0, 0.05, MAX_HOLD))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn duty(power: f64) -> Duty {
+        Duty::new(power).expect("within full power")
+    }
+
+    #[test]
+    fn a_request_out_of_its_range_is_refused_by_name() {
+        let check = |refused: Result<(), Refusal>, words: &str| {
+            let text = refused.expect_err(words).to_string();
+            assert!(text.contains(words), "{text:?} names {words:?}");
+        };
+        let straight = |distance| DriveDistance {
+            distance: Metres(distance),
+            power: duty(0.5),
+            stage: DriveStage::InitialRequest,
+            operation: None,
+            why: None,
+        };
+        let turn = |degrees| RotateDegrees {
+            degrees,
+            power: duty(0.5),
+            stage: DriveStage::InitialRequest,
+            operation: None,
+            why: None,
+        };
+        for distance in [-0.1, 1000.1, f64::NAN, f64::INFINITY, 1e300] {
+            check(straight(distance).check(), "a negative power drives backward");
+        }
+        assert!(straight(0.0).check().is_ok() && straight(1000.0).check().is_ok());
+        for degrees in [36_000.1, -36_001.0, f64::NAN, f64::NEG_INFINITY] {
+            check(turn(degrees).check(), "degrees");
+        }
+        assert!(turn(-36_000.0).check().is_ok());
+        for hold in [0.0, 0.049, -1.0, 5.01, f64::NAN] {
+            let hold = Some(Seconds(hold));
+            check(SetDrivePower { hold, ..SetDrivePower::default() }.check(), "hold in s");
+            check(SetDriveSpeed { hold, ..SetDriveSpeed::default() }.check(), "hold in s");
+        }
+        for speed in [20.1, -20.1, f64::NAN, 1e300] {
+            let speed = MetresPerSecond(speed);
+            check(SetDriveSpeed { left: speed, ..SetDriveSpeed::default() }.check(), "left speed");
+            check(SetDriveSpeed { right: speed, ..SetDriveSpeed::default() }.check(), "right speed");
+        }
+        check(StopDrive { by: "x".repeat(97) }.check(), "letters of who stops");
+    }
 }
