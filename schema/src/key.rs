@@ -7,6 +7,10 @@
 
 use crate::codec::{Message, decode, schema_of};
 use crate::command::{AllStop, Command, Done, Enable, GateState, Lease, LeaseAsk, Release};
+use crate::differential_drive::{
+    DriveDistance, DriveState, DriveStopped, EnableDrive, GetDrive, MotorPower, MotorReading, OperationBegun,
+    ResetEncoders, RotateDegrees, SetDrivePower, SetDriveSpeed, StopDrive,
+};
 use crate::id::{ALL, Boot, RobotId};
 use crate::plan::{Drive, DriveAsk, Plan, PlanAsk};
 use crate::presence::{Status, StatusAsk};
@@ -239,6 +243,41 @@ pub const GO_PLAN: Stream<Task<Plan>> = Stream::new("pilot", "plan", Urgency::Re
 /// The movements that the pilot has driven.
 pub const GO_DRIVE: Stream<Task<Drive>> = Stream::new("pilot", "drive", Urgency::Report);
 
+/// Generic Differential Drive: stops and disables.
+pub const DRIVE_ALL_STOP: Call<StopDrive, DriveStopped> = Call::new("drive", "all-stop");
+/// Generic Differential Drive: enables or disables.
+pub const DRIVE_ENABLE: Call<EnableDrive, Done> = Call::new("drive", "enable");
+/// Generic Differential Drive: the powers of both wheels.
+pub const DRIVE_POWER: Call<SetDrivePower, Done> = Call::new("drive", "power");
+/// Generic Differential Drive: the speeds of both wheels.
+pub const DRIVE_SPEED: Call<SetDriveSpeed, Done> = Call::new("drive", "speed");
+/// Generic Differential Drive: a distance straight on.
+pub const DRIVE_DISTANCE: Call<DriveDistance, OperationBegun> = Call::new("drive", "distance");
+/// Generic Differential Drive: an angle on the spot.
+pub const DRIVE_ROTATE: Call<RotateDegrees, OperationBegun> = Call::new("drive", "rotate");
+/// Generic Differential Drive: the encoders of its state to zero.
+pub const DRIVE_RESET: Call<ResetEncoders, Done> = Call::new("drive", "reset-encoders");
+/// Generic Differential Drive: its state.
+pub const DRIVE_GET: Call<GetDrive, DriveState> = Call::new("drive", "get");
+/// Generic Differential Drive: its state, on change.
+pub const DRIVE_UPDATE: Stream<DriveState> = Stream::new("drive", "update", Urgency::Report);
+/// Generic Differential Drive: the stages of a distance.
+pub const DRIVE_DISTANCE_STAGE: Stream<DriveDistance> =
+    Stream::new("drive", "distance-stage", Urgency::Report);
+/// Generic Differential Drive: the stages of a turn.
+pub const DRIVE_ROTATE_STAGE: Stream<RotateDegrees> = Stream::new("drive", "rotate-stage", Urgency::Report);
+
+/// Where the motor `service` hears its power.
+#[must_use]
+pub const fn motor_power(service: &'static str) -> Stream<MotorPower> {
+    Stream::new(service, "power", Urgency::Command)
+}
+/// Where the motor or encoder `service` says what it measures.
+#[must_use]
+pub const fn motor_reading(service: &'static str) -> Stream<MotorReading> {
+    Stream::new(service, "reading", Urgency::Control)
+}
+
 /// Where the corrector `service` takes its tasks of plan `P`.
 #[must_use]
 pub const fn corrector_task<P>(service: &'static str) -> Stream<Task<P>>
@@ -265,6 +304,9 @@ pub const BENCH: (Stream<NavigatorData>, Stream<NavigatorData>) =
 /// Stands for the name of any corrector in [`TABLE`].
 pub const ANY_CORRECTOR: &str = "<corrector>";
 
+/// Stands for the name of any motor or encoder service in [`TABLE`].
+pub const ANY_MOTOR: &str = "<motor>";
+
 /// All keys, in the order of the way of a task.
 pub const TABLE: &[Entry] = &[
     GO.entry("Take a task: plan it and drive it."),
@@ -284,6 +326,19 @@ pub const TABLE: &[Entry] = &[
     STOP.entry("Stop the wheels at once; latches."),
     ENABLE.entry("Allow the wheels to move after a stop or a boot."),
     GATE_STATE.entry("What the gate does, and why."),
+    DRIVE_ALL_STOP.entry("Contract: stop, take the power from the wheels, disable."),
+    DRIVE_ENABLE.entry("Contract: enable or disable the drive."),
+    DRIVE_POWER.entry("Contract: set the powers of both wheels."),
+    DRIVE_SPEED.entry("Contract: set the speeds of both wheels."),
+    DRIVE_DISTANCE.entry("Contract: drive straight by a distance."),
+    DRIVE_ROTATE.entry("Contract: turn on the spot by an angle."),
+    DRIVE_RESET.entry("Contract: set the encoders of the drive to zero."),
+    DRIVE_GET.entry("Contract: the state of the drive."),
+    DRIVE_UPDATE.entry("Contract: the state of the drive, on change."),
+    DRIVE_DISTANCE_STAGE.entry("Contract: a distance was started, completed or cancelled."),
+    DRIVE_ROTATE_STAGE.entry("Contract: a turn was started, completed or cancelled."),
+    motor_power(ANY_MOTOR).entry("The power of one motor."),
+    motor_reading(ANY_MOTOR).entry("What one motor or encoder measures."),
     ENCODERS.entry("Distance of each wheel since boot."),
     INERTIAL.entry("Turn rate and accelerations."),
     FIX.entry("An absolute position."),
@@ -305,6 +360,8 @@ const MORE_TYPES: &[Reader] = &[
     (schema_of::<Lease>, json::<Lease>),
     (schema_of::<Status>, json::<Status>),
     (schema_of::<StatusAsk>, json::<StatusAsk>),
+    (schema_of::<DriveStopped>, json::<DriveStopped>),
+    (schema_of::<OperationBegun>, json::<OperationBegun>),
 ];
 
 /// What a key is about.
@@ -332,7 +389,9 @@ pub fn find(key: &str) -> Option<&'static Entry> {
     let place = place(key)?;
     TABLE.iter().find(|entry| {
         let corrector = entry.service == ANY_CORRECTOR && place.service.ends_with("-corrector");
-        (corrector || entry.service == place.service) && entry.name == place.name
+        let is_motor = place.service.starts_with("motor-") || place.service.starts_with("encoder-");
+        let motor = entry.service == ANY_MOTOR && is_motor;
+        (corrector || motor || entry.service == place.service) && entry.name == place.name
     })
 }
 

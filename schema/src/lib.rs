@@ -29,6 +29,7 @@ pub mod codec;
 pub mod command;
 pub mod contract;
 pub mod curve;
+pub mod differential_drive;
 pub mod drivetrain;
 pub mod dwm;
 pub mod encoders;

@@ -1,5 +1,7 @@
 //! One value and more of every message: what the golden files hold.
 
+mod differential_drive;
+
 use super::golden::Golden;
 use axle_schema::command::{
     AllStop, BrakeCause, Class, Command, Done, Enable, GateState, Lease, LeaseAsk, Motion, Reject, Release,
@@ -22,6 +24,7 @@ pub(super) fn all() -> Vec<Golden> {
     plans(&mut all);
     correctors(&mut all);
     gate(&mut all);
+    differential_drive::examples(&mut all);
     measurements(&mut all);
     processes(&mut all);
     refusals(&mut all);

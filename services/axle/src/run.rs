@@ -1,5 +1,6 @@
 //! Services as processes: one file for each kind, which joins the pure value to the mesh.
 
+pub(crate) mod board;
 pub(crate) mod corrector;
 pub(crate) mod emulator;
 pub(crate) mod functional;

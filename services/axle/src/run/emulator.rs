@@ -1,202 +1,52 @@
 //! The emulator as a process: a robot in software behind its gate.
-//!
-//! The gate and the wheels live on a thread of their own, so that nothing else in the process can keep the gate from
-//! braking. Zenoh's callbacks fill bounded queues; the beat empties them.
 
 use super::Context;
+use super::board::{Paced, Wheels, own};
 use super::latch::Latch;
 use crate::params::load;
 use axle_emulator::{Emulator, EmulatorParams};
-use axle_gate::{COMMANDS_PER_BEAT, Gate, Headline};
-use axle_mesh::{Counters, Inbox, Mesh, Publisher, Server};
-use axle_schema::codec::decode_as;
-use axle_schema::command::{AllStop, Command, Done, Enable, GateState, Lease, LeaseAsk, Motion, Release};
+use axle_gate::Gate;
+use axle_mesh::Mesh;
 use axle_schema::meta::Cause;
-use axle_schema::{EncodersData, InertialData, NavigatorData, Refusal, RobotId, Seconds, key};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-
-/// The gate's state is said at least this often.
-const STATE_PERIOD: Seconds = Seconds(1.0);
+use axle_schema::{EncodersData, InertialData, MetresPerSecond, NavigatorData, RobotId, Seconds, Sides, key};
 
 /// Emulates until it is told to stop.
-pub(crate) async fn run(mut context: Context) -> anyhow::Result<()> {
+pub(crate) async fn run(context: Context) -> anyhow::Result<()> {
     let params: EmulatorParams = load(context.params.as_deref())?;
     let robot = context.one_robot()?;
-    let mesh = context.mesh.clone();
     let latch = Latch::open(&context.state, &robot)?;
-    let gate = Gate::new(params.gate, &params.robot, mesh.boot(), latch.kept())?;
-    let mut board = Board::new(&mesh, &robot, gate, latch, &params)?;
-    let stopping = Arc::new(AtomicBool::new(false));
-    let is_stopping = Arc::clone(&stopping);
-    let thread = mesh.beat_on_own_thread("gate", params.rates.beat, move |now| {
-        let is_stopping = is_stopping.load(Relaxed);
-        if is_stopping {
-            board.gate.disable(now);
-        }
-        board.beat(now);
-        // Who owns the wheels does not leave them turning.
-        !(is_stopping && board.gate.motion() == Motion::Standing)
-    })?;
-    let _visible = context.ready()?;
-    context.stop.wait().await;
-    stopping.store(true, Relaxed);
-    tokio::task::spawn_blocking(move || drop(thread.join())).await?;
-    Ok(())
+    let gate = Gate::new(params.gate, &params.robot, context.mesh.boot(), latch.kept())?;
+    let emulated = Emulated::new(&context.mesh, &robot, &params)?;
+    own(context, &robot, (gate, latch), emulated, params.rates.beat).await
 }
 
-/// A stream that is said at a rate of its own, which beats need not divide.
-struct Paced<M> {
-    publisher: Publisher<M>,
-    period: Seconds,
-    due: Seconds,
-}
-
-impl<M: axle_schema::Message> Paced<M> {
-    fn new(publisher: Publisher<M>, hz: f64) -> Self {
-        Self { publisher, period: Seconds(1.0 / hz), due: Seconds::ZERO }
-    }
-    fn put(&mut self, now: Seconds, cause: Option<Cause>, message: impl FnOnce() -> M) {
-        if now >= self.due {
-            // What was missed is not made up for.
-            self.due = (self.due + self.period).max(now);
-            say(self.publisher.put(&message(), cause).map(drop));
-        }
-    }
-}
-
-fn say(said: Result<(), Refusal>) {
-    if let Err(refusal) = said {
-        tracing::warn!("a measurement could not be said: {refusal}");
-    }
-}
-
-/// The emulated robot, its gate, and all its lines.
-struct Board {
-    gate: Gate,
-    latch: Latch,
+/// The emulated robot, and the lines of its sensors.
+struct Emulated {
     emulator: Emulator,
-    leases: Server<LeaseAsk, Lease>,
-    releases: Server<Release, Done>,
-    enables: Server<Enable, Done>,
-    commands: Inbox<Command>,
-    stops: Inbox<AllStop>,
-    state: Publisher<GateState>,
     encoders: Paced<EncodersData>,
     inertial: Paced<InertialData>,
     truth: Paced<NavigatorData>,
-    said: Option<(Headline, bool, Seconds)>,
-    /// Commands that were forgotten, and that were too large, as far as the gate has counted them; stops likewise.
-    unread: (u64, u64),
-    unread_stops: u64,
-    counters: Arc<Counters>,
-    obeyed: Option<Cause>,
 }
 
-impl Board {
-    fn new(
-        mesh: &Mesh,
-        robot: &RobotId,
-        gate: Gate,
-        latch: Latch,
-        params: &EmulatorParams,
-    ) -> anyhow::Result<Self> {
+impl Emulated {
+    fn new(mesh: &Mesh, robot: &RobotId, params: &EmulatorParams) -> anyhow::Result<Self> {
         Ok(Self {
-            gate,
-            latch,
             emulator: Emulator::new(*params)?,
-            leases: mesh.server(&key::LEASE.of(Some(robot)))?,
-            releases: mesh.server(&key::RELEASE.of(Some(robot)))?,
-            enables: mesh.server(&key::ENABLE.of(Some(robot)))?,
-            commands: mesh.inbox(&key::COMMAND.of(robot), COMMANDS_PER_BEAT as usize)?,
-            stops: mesh.inbox(&key::STOP.of(robot), 8)?,
-            state: mesh.publisher(&key::GATE_STATE.of(robot))?,
             encoders: Paced::new(mesh.publisher(&key::ENCODERS.of(robot))?, params.rates.encoders_hz),
             inertial: Paced::new(mesh.publisher(&key::INERTIAL.of(robot))?, params.rates.inertial_hz),
             truth: Paced::new(mesh.publisher(&key::TRUTH.of(robot))?, params.rates.truth_hz),
-            said: None,
-            unread: (0, 0),
-            unread_stops: 0,
-            counters: mesh.shared_counters(),
-            obeyed: None,
         })
     }
+}
 
-    fn beat(&mut self, now: Seconds) {
-        // Stops come first: nothing that arrived with them may move a wheel.
-        self.hear_stops(now);
-        while let Some(asked) = self.leases.try_next() {
-            let answer = asked.question().and_then(|ask| self.gate.lease(now, &ask));
-            asked.reply(answer);
-        }
-        while let Some(asked) = self.releases.try_next() {
-            let answer = asked.question().and_then(|release| self.gate.release(now, &release));
-            asked.reply(answer.map(|()| Done {}));
-        }
-        while let Some(asked) = self.enables.try_next() {
-            let answer = asked.question().and_then(|enable| self.gate.enable(now, &enable));
-            asked.reply(answer.map(|()| Done {}));
-        }
-        self.hear_commands(now);
-        let wheels = self.gate.beat(now);
-        self.emulator.advance(now, wheels);
-        self.latch.keep(self.gate.latch());
-        self.say_state(now);
-        let Self { emulator, encoders, inertial, truth, obeyed, .. } = self;
-        encoders.put(now, *obeyed, || emulator.encoders());
-        inertial.put(now, *obeyed, || emulator.inertial());
-        truth.put(now, *obeyed, || emulator.truth());
+impl Wheels for Emulated {
+    fn advance(&mut self, now: Seconds, speeds: Sides<MetresPerSecond>) {
+        self.emulator.advance(now, speeds);
     }
-
-    fn hear_stops(&mut self, now: Seconds) {
-        let unread = self.stops.oversized();
-        if unread > self.unread_stops {
-            self.unread_stops = unread;
-            tracing::warn!("an AllStop that is too large to be read disables the drive");
-            self.gate.disable(now);
-        }
-        while let Some(raw) = self.stops.take_raw() {
-            match decode_as::<AllStop>(&raw.encoding, &raw.payload) {
-                Ok(stop) => {
-                    tracing::warn!(stop = %stop.id, "AllStop by {}", stop.by);
-                    self.gate.stop(now, stop.id);
-                }
-                // Whoever speaks on this key wants the wheels to stand, even if the words are wrong.
-                Err(refusal) => {
-                    tracing::warn!("an AllStop that cannot be read disables the drive: {refusal}");
-                    self.gate.disable(now);
-                }
-            }
-        }
-    }
-
-    fn hear_commands(&mut self, now: Seconds) {
-        let unread = (self.commands.dropped(), self.commands.oversized());
-        self.gate.overflowed(unread.0 - self.unread.0);
-        self.gate.oversized(unread.1 - self.unread.1);
-        self.unread = unread;
-        for _ in 0..COMMANDS_PER_BEAT {
-            let Some(raw) = self.commands.take_raw() else { break };
-            match self.gate.command(now, &raw.encoding, &raw.payload) {
-                Ok(()) => self.obeyed = raw.meta().map(|meta| Cause { source: meta.source, seq: meta.seq }),
-                Err(reject) => {
-                    self.counters.count_refused();
-                    tracing::debug!("command refused: {reject:?}");
-                }
-            }
-        }
-    }
-
-    /// Says the gate's state on change and once a second.
-    fn say_state(&mut self, now: Seconds) {
-        let (headline, stored) = (self.gate.headline(), self.latch.is_stored());
-        let is_news = self
-            .said
-            .is_none_or(|(said, was, at)| (said, was) != (headline, stored) || now - at >= STATE_PERIOD);
-        if is_news {
-            self.said = Some((headline, stored, now));
-            let state = GateState { stored, ..self.gate.state(now) };
-            say(self.state.put(&state, None).map(drop));
-        }
+    fn say(&mut self, now: Seconds, cause: Option<Cause>) {
+        let Self { emulator, encoders, inertial, truth } = self;
+        encoders.put(now, cause, || emulator.encoders());
+        inertial.put(now, cause, || emulator.inertial());
+        truth.put(now, cause, || emulator.truth());
     }
 }
