@@ -3,6 +3,8 @@
 //! `cargo test -p axle --test whole` runs them all, `cargo test -p axle --test whole drive::` those of one module.
 
 #[cfg(test)]
+mod conform;
+#[cfg(test)]
 mod drive;
 #[cfg(test)]
 mod harness;

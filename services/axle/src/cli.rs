@@ -41,6 +41,8 @@ pub(crate) enum Command {
     Stop(Stop),
     /// Allow the wheels to move again after a stop
     Enable(Json),
+    /// Judge a drive by the Generic Differential Drive contract, clause by clause; the robot moves
+    Conform(Conform),
     /// Print any stream, decoded, one line a message
     Tap(Tap),
     /// Convert JSON lines: movements to poses, encoder readings to spans, and every other arrow of the map
@@ -81,6 +83,17 @@ pub(crate) struct Stop {
     /// Print one JSON object a robot
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// `axle conform`.
+#[derive(Clone, Debug, clap::Args)]
+pub(crate) struct Conform {
+    /// Print one JSON object a clause
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Write the report to a file as well
+    #[arg(long, value_name = "FILE")]
+    pub(crate) markdown: Option<PathBuf>,
 }
 
 /// Prints data for machines.

@@ -14,7 +14,7 @@ pub(crate) mod up;
 
 use crate::cli::{Cli, Command};
 use crate::out::{data, usage};
-use crate::{bench, catalog, demo};
+use crate::{bench, catalog, conform, demo};
 use clap::CommandFactory as _;
 
 /// Does what the command line says.
@@ -31,6 +31,7 @@ pub(crate) async fn dispatch(cli: Cli) -> anyhow::Result<()> {
         Command::Go(args) => go::go(&settings, args).await,
         Command::Stop(args) => stop::stop(&settings, &args).await,
         Command::Enable(args) => stop::enable(&settings, args.json).await,
+        Command::Conform(args) => conform::conform(&settings, &args).await,
         Command::Tap(args) => tap::tap(&settings, &args).await,
         Command::Convert(args) => convert::convert(&args),
         Command::Params { service } => {

@@ -9,6 +9,7 @@ mod catalog;
 mod chart;
 mod cli;
 mod command;
+mod conform;
 mod demo;
 mod out;
 mod params;

@@ -79,6 +79,25 @@ impl Mesh {
         }
     }
 
+    /// Asks with bytes that are no message which this process would send: to find out what is refused.
+    ///
+    /// # Errors
+    /// The [`Refusal`] of whoever answers, or [`Refusal::Unavailable`].
+    pub async fn ask_bytes<Q: Message, A: Message>(
+        &self,
+        call: &Call<Q, A>,
+        robot: Option<&RobotId>,
+        bytes: &[u8],
+        deadline: Duration,
+    ) -> Result<A, Refusal> {
+        match self.ask_once::<Q, A>(&call.of(robot), bytes, deadline).await? {
+            Answer::Given(answer) => Ok(answer),
+            Answer::None | Answer::Late => {
+                Err(Refusal::unavailable(call.service(), "nobody answers at this key"))
+            }
+        }
+    }
+
     async fn ask_once<Q: Message, A: Message>(
         &self,
         key: &Key<Q>,
