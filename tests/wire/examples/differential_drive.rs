@@ -7,9 +7,7 @@ use axle_schema::differential_drive::{
     MotorReading, OperationBegun, ResetEncoders, RotateDegrees, SetDrivePower, SetDriveSpeed, StopDrive,
     WheelState,
 };
-use axle_schema::{
-    Boot, Duty, Metres, MetresPerSecond, Refusal, Seconds, Sides, StopId, TaskId, Tick,
-};
+use axle_schema::{Boot, Duty, Metres, MetresPerSecond, Refusal, Seconds, Sides, StopId, TaskId, Tick};
 
 fn duty(value: f64) -> Duty {
     Duty::new(value).expect("within full power")
@@ -32,10 +30,7 @@ pub(super) fn examples(all: &mut Vec<Golden>) {
     all.push(Golden::new("", ResetEncoders {}));
     all.push(Golden::new("", GetDrive {}));
     states(all);
-    all.push(Golden::new(
-        "",
-        MotorPower { boot: Boot(7), seq: 41, echo: Tick(123_456), power: duty(0.35) },
-    ));
+    all.push(Golden::new("", MotorPower { boot: Boot(7), seq: 41, echo: Tick(123_456), power: duty(0.35) }));
     let reading = MotorReading {
         boot: Boot(7),
         stamp: Seconds(12.34),
