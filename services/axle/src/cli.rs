@@ -1,5 +1,7 @@
 //! The command line.
 
+pub(crate) mod drive;
+
 use crate::settings::Settings;
 use axle_schema::{Pose, Refusal, WayTask};
 use clap::{Parser, Subcommand, ValueEnum};
@@ -37,6 +39,9 @@ pub(crate) enum Command {
     Plan(Plan),
     /// Drive a way, and show how far the robot is
     Go(Go),
+    /// Drive by the Generic Differential Drive contract: powers, speeds, distances, degrees, the keyboard
+    #[command(subcommand)]
+    Drive(drive::Drive),
     /// Stop the wheels at once; nothing moves until `axle enable`
     Stop(Stop),
     /// Allow the wheels to move again after a stop

@@ -2,6 +2,7 @@
 
 mod convert;
 mod docs;
+mod drive;
 pub(crate) mod go;
 mod ls;
 mod plan;
@@ -29,6 +30,7 @@ pub(crate) async fn dispatch(cli: Cli) -> anyhow::Result<()> {
         Command::Ls(args) => ls::ls(&settings, &args).await,
         Command::Plan(args) => plan::plan(&settings, args).await,
         Command::Go(args) => go::go(&settings, args).await,
+        Command::Drive(args) => drive::drive(&settings, args).await,
         Command::Stop(args) => stop::stop(&settings, &args).await,
         Command::Enable(args) => stop::enable(&settings, args.json).await,
         Command::Conform(args) => conform::conform(&settings, &args).await,

@@ -1,10 +1,13 @@
 //! Services as processes: one file for each kind, which joins the pure value to the mesh.
 
 pub(crate) mod board;
+pub(crate) mod composed;
 pub(crate) mod corrector;
+pub(crate) mod drive;
 pub(crate) mod emulator;
 pub(crate) mod functional;
 pub(crate) mod latch;
+pub(crate) mod motor;
 pub(crate) mod navigator;
 pub(crate) mod pilot;
 pub(crate) mod recorder;

@@ -150,9 +150,9 @@ impl Supervisor {
     /// Ends all children in their order; within three seconds nothing is left.
     pub(crate) async fn stop(self) {
         let stages: [Stage; 4] = [
-            (|name| name.ends_with("-corrector"), GIVING_BACK),
-            (|name| name != "recorder" && name != "router", ENDING),
-            (|name| name == "recorder", LAST),
+            (|name| name.ends_with("-corrector") || name == "drive", GIVING_BACK),
+            (|name| name != "recorder" && name != "router" && !name.starts_with("motor-"), ENDING),
+            (|name| name == "recorder" || name.starts_with("motor-"), LAST),
             (|_| true, LAST),
         ];
         for (is_due, patience) in stages {

@@ -162,12 +162,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_shipped_topology_is_right() {
-        let topology = Topology::parse(DEFAULT).expect("the shipped file");
-        let (host, _) = topology.host(None).expect("one host");
-        assert!(topology.services_of(host).count() >= 8);
-        for service in &topology.services {
-            assert!(topology.params_of(service).is_ok());
+    fn the_shipped_topologies_are_right() {
+        for text in [DEFAULT, include_str!("../../../deploy/topologies/composed.toml")] {
+            let topology = Topology::parse(text).expect("a shipped file");
+            let (host, _) = topology.host(None).expect("one host");
+            assert!(topology.services_of(host).count() >= 8);
+            for service in &topology.services {
+                assert!(topology.params_of(service).is_ok());
+            }
         }
     }
 

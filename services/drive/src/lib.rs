@@ -20,6 +20,7 @@ mod odometer;
 mod params;
 mod plan;
 mod say;
+mod wheel;
 
 #[cfg(test)]
 mod courses;
@@ -31,3 +32,4 @@ mod rig;
 pub use facade::Facade;
 pub use params::DriveParams;
 pub use say::{Out, Reply, Request, Ticket};
+pub use wheel::{Wheel, WheelGains};

@@ -13,6 +13,7 @@
 //! It is a value in virtual time: it moves when told to, and the same seed and calls give the same bits.
 
 mod emulator;
+mod motor;
 mod params;
 mod random;
 
@@ -20,4 +21,5 @@ mod random;
 mod courses;
 
 pub use emulator::Emulator;
+pub use motor::{Motor, MotorParams, RIGHT_MOTOR};
 pub use params::{EmulatorParams, EncodersParams, GyroParams, MotorsParams, Rates};

@@ -108,17 +108,22 @@ impl Bar {
         Self { bar }
     }
     pub(crate) fn show(&self, progress: &PilotProgress) {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share from 0 to 1")]
-        self.bar.set_position((progress.fraction * 1000.0) as u64);
         let phase = match progress.phase {
             Phase::Planning => "planning",
             Phase::Running => "driving",
             _ => "over",
         };
-        self.bar.set_message(format!(
+        let message = format!(
             "{phase}: {}/{} way points, {:.2} m from the last, {:.1} s",
             progress.reached, progress.points, progress.distance_left.0, progress.elapsed.0
-        ));
+        );
+        self.set(progress.fraction, message);
+    }
+    /// Shows a share from 0 to 1.
+    pub(crate) fn set(&self, share: f64, message: String) {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share from 0 to 1")]
+        self.bar.set_position((share * 1000.0) as u64);
+        self.bar.set_message(message);
     }
     pub(crate) fn clear(&self) {
         self.bar.finish_and_clear();
