@@ -11,6 +11,10 @@ use axle_schema::{Metres, MetresPerSecond, Refusal, Seconds, Sides, StopId, Task
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::time::Duration;
+
+/// The kit waits for whatever a drive may do late, and a broken one does nothing.
+const LONG: Duration = Duration::from_secs(120);
 
 /// The verdicts of a report in JSON lines.
 fn verdicts(out: &str) -> BTreeMap<String, String> {
@@ -28,7 +32,7 @@ async fn the_drive_of_axle_keeps_every_clause() {
     all_alive(&robot.mesh, &["drive"]).await;
     let report = robot.world.path().join("report.md");
     let file = report.display().to_string();
-    let kit = robot.world.done(&["conform", "--json", "--markdown", &file]).await;
+    let kit = robot.world.tool(&["conform", "--json", "--markdown", &file]).ended_within(LONG).await;
     kit.is(0, &[]);
     let verdicts = verdicts(&kit.out);
     assert!(verdicts.len() >= 28, "{verdicts:?}");
@@ -69,23 +73,28 @@ impl Braggart {
 
     async fn serve(self: Arc<Self>, mesh: &Mesh) {
         let robot = Some(&r1());
+        let get_key = key::DRIVE_GET.of(robot);
+        let power_key = key::DRIVE_POWER.of(robot);
+        let enable_key = key::DRIVE_ENABLE.of(robot);
+        let stop_key = key::DRIVE_ALL_STOP.of(robot);
+        let distance_key = key::DRIVE_DISTANCE.of(robot);
         let one = Arc::clone(&self);
         let (get, power, enable, stop) = (Arc::clone(&one), Arc::clone(&one), Arc::clone(&one), one);
-        let get = mesh.serve(&key::DRIVE_GET.of(robot), move |GetDrive {}, _| Ok(get.state()));
-        let power = mesh.serve(&key::DRIVE_POWER.of(robot), move |ask: SetDrivePower, _| {
+        let get = mesh.serve(&get_key, move |GetDrive {}, _| Ok(get.state()));
+        let power = mesh.serve(&power_key, move |ask: SetDrivePower, _| {
             power.moving.store(ask.left.get() != 0.0 || ask.right.get() != 0.0, Relaxed);
             Ok(Done {})
         });
-        let enable = mesh.serve(&key::DRIVE_ENABLE.of(robot), move |ask: EnableDrive, _| {
+        let enable = mesh.serve(&enable_key, move |ask: EnableDrive, _| {
             enable.enabled.store(ask.enable, Relaxed);
             Ok(Done {})
         });
-        let stop = mesh.serve(&key::DRIVE_ALL_STOP.of(robot), move |_: StopDrive, _| {
+        let stop = mesh.serve(&stop_key, move |_: StopDrive, _| {
             stop.enabled.store(false, Relaxed);
             Ok(DriveStopped { stop: StopId(1) })
         });
         let said = mesh.publisher(&key::DRIVE_DISTANCE_STAGE.of(&r1())).expect("a publisher");
-        let distance = mesh.serve(&key::DRIVE_DISTANCE.of(robot), move |ask: DriveDistance, _| {
+        let distance = mesh.serve(&distance_key, move |ask: DriveDistance, _| {
             let operation = TaskId(7);
             let notice = DriveDistance { stage: DriveStage::Started, operation: Some(operation), ..ask };
             said.put(&notice, None).map_err(Refusal::internal)?;
@@ -103,7 +112,7 @@ async fn a_drive_that_is_broken_on_purpose_fails() {
     let (enabled, wheels, moving) = (AtomicBool::new(true), AtomicU64::new(0), AtomicBool::new(false));
     let braggart = Arc::new(Braggart { enabled, wheels, moving });
     let serving = tokio::spawn(async move { braggart.serve(&mesh).await });
-    let kit = world.done(&["conform", "--json"]).await;
+    let kit = world.tool(&["conform", "--json"]).ended_within(LONG).await;
     kit.is(1, &["of the contract's clauses do not hold"]);
     let verdicts = verdicts(&kit.out);
     let wrong = [

@@ -29,13 +29,18 @@ const LOOK: Duration = Duration::from_millis(15);
 pub(crate) const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Looks until `look` finds something.
-pub(crate) async fn eventually<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
-    let end = Instant::now() + PATIENCE;
+pub(crate) async fn eventually<T>(what: &str, look: impl FnMut() -> Option<T>) -> T {
+    at_last(PATIENCE, what, look).await
+}
+
+/// The same for what takes its time.
+pub(crate) async fn at_last<T>(patience: Duration, what: &str, mut look: impl FnMut() -> Option<T>) -> T {
+    let end = Instant::now() + patience;
     loop {
         if let Some(found) = look() {
             return found;
         }
-        assert!(Instant::now() < end, "not within {PATIENCE:?}: {what}");
+        assert!(Instant::now() < end, "not within {patience:?}: {what}");
         tokio::time::sleep(LOOK).await;
     }
 }

@@ -1,6 +1,6 @@
 //! One process of the program.
 
-use super::eventually;
+use super::{PATIENCE, at_last, eventually};
 use nix::sys::signal::{Signal, kill, killpg};
 use nix::unistd::Pid;
 use std::fs::File;
@@ -119,8 +119,12 @@ impl Process {
     }
     /// Waits until it has ended.
     pub(crate) async fn ended(&mut self) -> Ended {
+        self.ended_within(PATIENCE).await
+    }
+    /// The same for what takes its time.
+    pub(crate) async fn ended_within(&mut self, patience: Duration) -> Ended {
         let what = format!("{} ends", self.what);
-        let status = eventually(&what, || self.child.try_wait().expect("a child")).await;
+        let status = at_last(patience, &what, || self.child.try_wait().expect("a child")).await;
         let (out, err, took) = (self.out(), self.err(), self.begun.elapsed());
         Ended { code: status.code(), out, err, took, what: self.what.clone() }
     }

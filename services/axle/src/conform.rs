@@ -17,6 +17,11 @@ use anyhow::Context as _;
 use client::Client;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use report::Report;
+use std::time::Duration;
+use tokio::time::Instant;
+
+/// How long a drive may take to answer at first.
+const COMING: Duration = Duration::from_secs(3);
 
 /// Judges every clause, one after the other; the robot moves by up to a metre.
 pub(crate) async fn conform(settings: &Settings, args: &Conform) -> anyhow::Result<()> {
@@ -24,7 +29,12 @@ pub(crate) async fn conform(settings: &Settings, args: &Conform) -> anyhow::Resu
     let mut stop = signal::stop()?;
     let mesh = settings.join("conform").await?;
     let mut client = Client::new(&mesh, &robot)?;
-    let before = client.get().await.with_context(|| {
+    // A drive that has just started may not have heard of its robot yet.
+    let (began, mut before) = (Instant::now(), client.get().await);
+    while before.is_err() && began.elapsed() < COMING {
+        before = client.get().await;
+    }
+    let before = before.with_context(|| {
         format!("the drive of {robot} does not answer; is `axle run drive` (or your own implementation) up?")
     })?;
     note(&format!("{robot} will move by up to a metre in both directions, and turn on the spot"));
