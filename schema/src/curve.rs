@@ -196,7 +196,9 @@ impl Curve {
         }
     }
 
-    /// The states along the curve, for a chart: those of its normalized movement (see [`Dwm::poses`]).
+    /// The states along the curve, for a chart: those of its normalized movement (see [`Dwm::poses`]), so that the
+    /// stamps count the metres of the faster wheel from 0, and `step` is in these metres too. For a geometry:
+    /// `Curve::from(geometry)`.
     ///
     /// # Errors
     /// Refuses numbers that are not finite.

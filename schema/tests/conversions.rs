@@ -192,7 +192,7 @@ proptest! {
         let miss = (there.x.0 - back.x.0).hypot(there.y.0 - back.y.0);
         prop_assert!(miss <= 1.1e-6, "{geometry:?} {again:?}");
         prop_assert!((there.heading.0 - back.heading.0).abs() <= 1.1e-6, "{geometry:?} {again:?}");
-        let end = geometry.poses(Pose::default(), track(), Seconds(0.1)).unwrap().last().unwrap();
+        let end = Curve::from(geometry).poses(Pose::default(), track(), Seconds(0.1)).unwrap().last().unwrap();
         let miss = end.pose.distance(Pose { x: there.x, y: there.y, heading: there.heading });
         prop_assert!(miss.0 <= 1e-14 * (1.0 + movement.duration().0), "{geometry:?} {miss}");
         prop_assert!((movement.peak_speed().0 - 1.0).abs() <= 2.0 * f64::EPSILON, "{movement:?}");
@@ -370,7 +370,7 @@ fn a_chart_has_the_start_the_end_and_equal_steps_between() {
     assert_eq!(Dwm::rest(Seconds::ZERO).poses(from, track(), Seconds(0.1)).count(), 1);
     let end = movement.poses(from, track(), Seconds(0.5)).last().unwrap();
     assert_eq!(end.pose, movement.pose_at(from.pose, track(), Seconds(2.0)));
-    assert_eq!(line(0.0).poses(Pose::default(), track(), Seconds(0.1)).unwrap().count(), 1);
+    assert_eq!(Curve::from(line(0.0)).poses(Pose::default(), track(), Seconds(0.1)).unwrap().count(), 1);
 }
 
 #[test]

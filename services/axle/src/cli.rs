@@ -52,6 +52,8 @@ pub(crate) enum Command {
     Tap(Tap),
     /// Convert JSON lines: movements to poses, encoder readings to spans, and every other arrow of the map
     Convert(Convert),
+    /// Draw JSON lines or a recording as SVG: the path, and what the wheels do over time
+    Chart(Chart),
     /// Print the parameters of a service with their explanations
     Params {
         /// The service
@@ -271,6 +273,20 @@ pub(crate) struct Convert {
     /// Make one chain of all spans, without a jump of a speed and as smooth as can be
     #[arg(long)]
     pub(crate) chain: bool,
+}
+
+/// Arguments of `axle chart`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Chart {
+    /// JSON lines as `axle convert` reads or writes them, or an MCAP recording; - is stdin; several are compared
+    #[arg(required = true, value_name = "FILE")]
+    pub(crate) files: Vec<String>,
+    /// The distance between the wheels in metres, where a line has no "track"
+    #[arg(long, value_name = "METRES", allow_hyphen_values = true)]
+    pub(crate) track: Option<f64>,
+    /// Where to write the chart [default: stdout]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
 }
 
 /// The benches.

@@ -15,7 +15,7 @@ fn run(words: &str, input: &str) -> (Vec<String>, Vec<String>, u64) {
     let work = arrow.unwrap().work(&args).unwrap();
     let (mut out, mut complaints) = (Vec::new(), Vec::new());
     let (_, bad) =
-        pump(BufReader::new(input.as_bytes()), &mut out, work, &mut |words| complaints.push(words.into()))
+        pump(Lines::new(input.as_bytes()), &mut out, work, &mut |words| complaints.push(words.into()))
             .unwrap();
     let lines = String::from_utf8(out).unwrap().lines().map(str::to_owned).collect();
     (lines, complaints, bad)
