@@ -24,6 +24,7 @@ struct Line {
     /// What the legend calls it; nothing for a line that looks like another one.
     name: &'static str,
     style: ShapeStyle,
+    is_right: bool,
     points: Vec<(f64, f64)>,
 }
 
@@ -42,18 +43,23 @@ impl Panel {
         Self { axis: "wheel distance (m)", lines }
     }
 
-    /// What the wheels of some runs did. One run has a hue for each wheel; of several each has the ink of its path, and
-    /// the left wheel is wide and pale.
+    /// What the wheels of some runs did. One run has a hue for each wheel; of several each has the ink of its path, the
+    /// left wheel is wide and pale, and each run is drawn thinner than those below it.
     pub(crate) fn of_runs(axis: &'static str, runs: &[&[WheelPoint]]) -> Self {
         const NAMES: [&str; 2] = ["left wheel", "right wheel"];
         if let [only] = runs {
             return Self { axis, lines: sides(NAMES, LEFT_AND_RIGHT.map(look), only) };
         }
-        let looks = |ink: RGBColor| [line(ink.mix(0.4), 60), line(ink.into(), 18)];
-        let mut lines = sides(NAMES, looks(INK), &[]);
+        let looks = |ink: RGBColor, above: usize| {
+            let [left, right] = [[90, 60, 40], [30, 20, 14]].map(|widths| widths[above.min(2)]);
+            [line(pale(ink).into(), left), line(ink.into(), right)]
+        };
+        let mut lines = sides(NAMES, looks(INK, 1), &[]);
         for (index, run) in runs.iter().enumerate() {
-            lines.extend(sides(["", ""], looks(ink(index + 1)), run));
+            lines.extend(sides(["", ""], looks(ink(index + 1), index), run));
         }
+        // All left wheels lie below all right ones, of which none could be seen otherwise.
+        lines[2..].sort_by_key(|line| line.is_right);
         Self { axis, lines }
     }
 
@@ -84,6 +90,12 @@ impl Panel {
 /// Ink and width in tenths of a pixel.
 const LEFT_AND_RIGHT: [(RGBColor, u32); 2] = [(BLUE, 28), (VERMILION, 16)];
 
+/// A tint that hides what it covers, so that two of them do not mix.
+fn pale(ink: RGBColor) -> RGBColor {
+    let tint = |part: u8| 255 - (255 - part) / 5 * 2;
+    RGBColor(tint(ink.0), tint(ink.1), tint(ink.2))
+}
+
 fn look((ink, width): (RGBColor, u32)) -> ShapeStyle {
     line(ink.into(), width)
 }
@@ -94,6 +106,7 @@ fn sides(names: [&'static str; 2], styles: [ShapeStyle; 2], points: &[WheelPoint
         .map(|side| Line {
             name: names[side],
             style: styles[side],
+            is_right: side == 1,
             points: points.iter().map(|point| (point.time, picks[side](point))).collect(),
         })
         .collect()

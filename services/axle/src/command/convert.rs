@@ -73,3 +73,5 @@ fn pump(
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+pub(crate) use tests::converted;

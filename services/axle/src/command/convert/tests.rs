@@ -21,6 +21,13 @@ fn run(words: &str, input: &str) -> (Vec<String>, Vec<String>, u64) {
     (lines, complaints, bad)
 }
 
+/// The lines that `axle convert` with these words makes of good lines.
+pub(crate) fn converted(words: &str, input: &str) -> Vec<String> {
+    let (lines, complaints, _) = run(words, input);
+    assert_eq!(complaints, Vec::<String>::new(), "{words}");
+    lines
+}
+
 fn check(words: &str, input: &str, output: &[&str]) {
     let (lines, complaints, bad) = run(words, input);
     assert_eq!(
