@@ -380,3 +380,16 @@ fn a_long_arc_keeps_the_digits_of_its_heading() {
     assert_eq!(span.heading, Radians(1e-6));
     assert!((span.y.0 - 5e-7).abs() < 1e-19, "{span:?}");
 }
+
+#[test]
+fn a_curve_that_hardly_bends_is_a_line() {
+    for curvature in [5e-324, -5e-324, 1e-310, 2e-308] {
+        for length in [1e6, 1.0, -1.0, 5e-324] {
+            let (start_curvature, end_curvature) = (PerMetre(curvature), PerMetre(0.0));
+            let curve = Curve::Clothoid { start_curvature, end_curvature, length: Metres(length) };
+            let span = curve.navigator_span();
+            assert_eq!(span.x, Metres(length), "{curve:?}");
+            assert!(span.y.0.abs() < 1e-290 && span.heading.0.abs() < 1e-300, "{span:?}");
+        }
+    }
+}

@@ -65,7 +65,7 @@ async fn every_arrow_of_the_map_leads_somewhere_and_both_its_ends_can_be_drawn()
 async fn numbers_come_back_as_they_went() {
     let world = World::new().await;
     let readings = "{\"stamp\":0.1,\"left\":0.30000000000000004,\"right\":1e-7}\n\
-                    {\"stamp\":5e-324,\"left\":-0.0,\"right\":1.7976931348623157e308}\n\
+                    {\"stamp\":5e-324,\"left\":-0.0,\"right\":1.7976931348623157e+308}\n\
                     {\"stamp\":123456789.12345679,\"left\":2.2250738585072014e-308,\"right\":9007199254740993.0}\n";
     let halves = world.fed(&["convert", "encoders-data", "halves"], readings).await;
     halves.is(0, &[]);

@@ -29,7 +29,7 @@ pub(crate) fn convert(args: &Convert) -> anyhow::Result<()> {
 /// Every arrow, in a table.
 fn map() -> String {
     let line =
-        |Arrow { from, to, takes, about, .. }: &Arrow| format!("{from:<15} -> {to:<16} {takes:<24} {about}");
+        |Arrow { from, to, takes, about, .. }: &Arrow| format!("{from:<15} -> {to:<16} {takes:<29} {about}");
     let arrows: Vec<_> = ARROWS.iter().map(line).collect();
     format!(
         "{}\n\nEvery line is a JSON object. \"track\" (metres) may stand in the line or be given by --track.\n\
