@@ -156,6 +156,8 @@ fn start(area: &Area<'_>, place: (i32, i32)) -> anyhow::Result<()> {
 fn end(area: &Area<'_>, (x, y): (i32, i32), ink: RGBColor) -> anyhow::Result<()> {
     let r = at(6.0);
     let square = [(x - r, y - r), (x + r, y - r), (x + r, y + r), (x - r, y + r), (x - r, y - r)];
+    // A white rim, so that it is seen on a path of its own ink too.
+    area.draw(&PathElement::new(square, line(WHITE.into(), 50))).map_err(failed)?;
     area.draw(&PathElement::new(square, line(ink.into(), 20))).map_err(failed)
 }
 
