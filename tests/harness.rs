@@ -114,6 +114,10 @@ impl World {
     pub(crate) fn axle(&self, args: &[&str]) -> Process {
         Process::start(args, self.path())
     }
+    /// Runs `axle` with exactly these arguments and this text as its stdin to its end.
+    pub(crate) async fn fed(&self, args: &[&str], input: &str) -> Ended {
+        Process::fed(args, input, self.path()).ended().await
+    }
     /// Starts `axle` with these arguments, connected to the router of this world.
     pub(crate) fn tool(&self, args: &[&str]) -> Process {
         self.axle(&[args, &["--connect", &self.endpoint]].concat())

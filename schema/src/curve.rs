@@ -178,7 +178,8 @@ impl Curve {
         };
         let fastest = middle[0].abs().max(middle[1].abs());
         let quickest = turning[0].abs().max(turning[1].abs());
-        let half = if fastest > 0.0 && quickest > 0.0 { fastest / quickest } else { 1.0 };
+        // Below 1e-300/m a curve is straight in every digit, and its own track would not be finite.
+        let half = if fastest > 0.0 && quickest > 0.0 { (fastest / quickest).min(1e300) } else { 1.0 };
         let motion = Wheels {
             v0l: middle[0] - turning[0] * half,
             v0r: middle[0] + turning[0] * half,
@@ -196,7 +197,9 @@ impl Curve {
         }
     }
 
-    /// The states along the curve, for a chart: those of its normalized movement (see [`Dwm::poses`]).
+    /// The states along the curve, for a chart: those of its normalized movement (see [`Dwm::poses`]), so that the
+    /// stamps count the metres of the faster wheel from 0, and `step` is in these metres too. For a geometry:
+    /// `Curve::from(geometry)`.
     ///
     /// # Errors
     /// Refuses numbers that are not finite.

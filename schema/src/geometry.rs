@@ -5,7 +5,7 @@
 //! beyond the paper, for which a wheel must accelerate against the other, are a type of their own,
 //! [`Curve`](crate::Curve): a plan with a leg that no service can drive cannot be written down.
 
-use crate::navigator::{NavigatorData, NavigatorSpan, Pose};
+use crate::navigator::{NavigatorSpan, Pose};
 use crate::{Dwm, Metres, MetresPerSecond, Radians, Refusal, Seconds, Sides, Track, motion};
 use serde::{Deserialize, Serialize};
 
@@ -96,6 +96,7 @@ impl Geometry {
     }
 
     /// The movement without acceleration whose faster wheel has speed 1: for drawing only (paper, I.B; model.md, 4.1).
+    /// [`Curve::poses`](crate::Curve::poses) draws it.
     ///
     /// # Errors
     /// Refuses numbers that are not finite.
@@ -107,21 +108,6 @@ impl Geometry {
         } else {
             Ok(Dwm::rest(Seconds::ZERO))
         }
-    }
-
-    /// The states along the geometry, for a chart: those of its normalized movement (see [`Dwm::poses`]), so that the
-    /// stamps count the metres of the faster wheel from 0, and `step` is in these metres too.
-    ///
-    /// # Errors
-    /// Refuses numbers that are not finite.
-    pub fn poses(
-        &self,
-        from: Pose,
-        track: Track,
-        step: Seconds,
-    ) -> Result<impl Iterator<Item = NavigatorData> + use<>, Refusal> {
-        let from = NavigatorData { pose: from, ..NavigatorData::default() };
-        Ok(self.normalized_dwm(track)?.poses(from, track, step))
     }
 
     /// Refuses numbers that no robot can drive: not finite, or beyond 1e6 m or 1e6 rad.

@@ -37,6 +37,7 @@ mod quadrature;
 pub mod reckon;
 mod scale;
 mod shape;
+pub mod simpson;
 mod stretch;
 mod tables;
 

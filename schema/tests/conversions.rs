@@ -192,7 +192,7 @@ proptest! {
         let miss = (there.x.0 - back.x.0).hypot(there.y.0 - back.y.0);
         prop_assert!(miss <= 1.1e-6, "{geometry:?} {again:?}");
         prop_assert!((there.heading.0 - back.heading.0).abs() <= 1.1e-6, "{geometry:?} {again:?}");
-        let end = geometry.poses(Pose::default(), track(), Seconds(0.1)).unwrap().last().unwrap();
+        let end = Curve::from(geometry).poses(Pose::default(), track(), Seconds(0.1)).unwrap().last().unwrap();
         let miss = end.pose.distance(Pose { x: there.x, y: there.y, heading: there.heading });
         prop_assert!(miss.0 <= 1e-14 * (1.0 + movement.duration().0), "{geometry:?} {miss}");
         prop_assert!((movement.peak_speed().0 - 1.0).abs() <= 2.0 * f64::EPSILON, "{movement:?}");
@@ -370,7 +370,7 @@ fn a_chart_has_the_start_the_end_and_equal_steps_between() {
     assert_eq!(Dwm::rest(Seconds::ZERO).poses(from, track(), Seconds(0.1)).count(), 1);
     let end = movement.poses(from, track(), Seconds(0.5)).last().unwrap();
     assert_eq!(end.pose, movement.pose_at(from.pose, track(), Seconds(2.0)));
-    assert_eq!(line(0.0).poses(Pose::default(), track(), Seconds(0.1)).unwrap().count(), 1);
+    assert_eq!(Curve::from(line(0.0)).poses(Pose::default(), track(), Seconds(0.1)).unwrap().count(), 1);
 }
 
 #[test]
@@ -379,4 +379,17 @@ fn a_long_arc_keeps_the_digits_of_its_heading() {
     let span = arc(1e6, 1e-6).navigator_span();
     assert_eq!(span.heading, Radians(1e-6));
     assert!((span.y.0 - 5e-7).abs() < 1e-19, "{span:?}");
+}
+
+#[test]
+fn a_curve_that_hardly_bends_is_a_line() {
+    for curvature in [5e-324, -5e-324, 1e-310, 2e-308] {
+        for length in [1e6, 1.0, -1.0, 5e-324] {
+            let (start_curvature, end_curvature) = (PerMetre(curvature), PerMetre(0.0));
+            let curve = Curve::Clothoid { start_curvature, end_curvature, length: Metres(length) };
+            let span = curve.navigator_span();
+            assert_eq!(span.x, Metres(length), "{curve:?}");
+            assert!(span.y.0.abs() < 1e-290 && span.heading.0.abs() < 1e-300, "{span:?}");
+        }
+    }
 }

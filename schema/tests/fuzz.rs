@@ -2,6 +2,7 @@
 //!
 //! A short run is part of every test run. A long one, with the same cases every time:
 //! `PROPTEST_CASES=80000 PROPTEST_RNG_SEED=1 cargo test --locked -p axle-schema --test fuzz`.
+//! `.ci/run fuzz` runs one seed after the other for a minute.
 
 #![allow(clippy::unwrap_used, reason = "what a constructor took must convert")]
 

@@ -12,7 +12,8 @@ use std::time::{Duration, Instant};
 
 /// A process in a group of its own, with its words in files; it and its children are killed on drop.
 pub(crate) struct Process {
-    // Its stdin is a pipe, at whose end it ends too: so nothing is left even when the test binary itself is killed.
+    // Its stdin is a pipe, at whose end it ends too: so nothing is left even when the test binary itself is killed. One
+    // that is fed a text ends with it.
     child: Child,
     what: String,
     out: PathBuf,
@@ -60,11 +61,23 @@ impl Process {
     pub(super) fn start(args: &[&str], directory: &Path) -> Self {
         Self::with_env(args, &[], directory)
     }
+    /// Starts the program with this text as its stdin.
+    pub(super) fn fed(args: &[&str], input: &str, directory: &Path) -> Self {
+        Self::spawn(args, &[], Some(input), directory)
+    }
     /// Starts the program in a directory with these variables, and without any other of Axle's own.
     pub(crate) fn with_env(args: &[&str], variables: &[(&str, &str)], directory: &Path) -> Self {
+        Self::spawn(args, variables, None, directory)
+    }
+    fn spawn(args: &[&str], variables: &[(&str, &str)], input: Option<&str>, directory: &Path) -> Self {
         static NEXT: AtomicU32 = AtomicU32::new(0);
         let number = NEXT.fetch_add(1, Relaxed);
-        let (out, err) = (directory.join(format!("{number}.out")), directory.join(format!("{number}.err")));
+        let file = |kind: &str| directory.join(format!("{number}.{kind}"));
+        let (out, err) = (file("out"), file("err"));
+        let stdin = input.map_or_else(Stdio::piped, |text| {
+            std::fs::write(file("in"), text).expect("a file");
+            File::open(file("in")).expect("a file").into()
+        });
         let mut command = Command::new(env!("CARGO_BIN_EXE_axle"));
         for (name, _) in std::env::vars_os() {
             if name.to_string_lossy().starts_with("AXLE_") {
@@ -79,7 +92,7 @@ impl Process {
             .env("AXLE_STATE", directory.join("state"))
             .env("NO_COLOR", "1")
             .env("AXLE_PARENT", "stdin")
-            .stdin(Stdio::piped())
+            .stdin(stdin)
             .stdout(File::create(&out).expect("a file"))
             .stderr(File::create(&err).expect("a file"))
             .process_group(0)

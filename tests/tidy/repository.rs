@@ -77,7 +77,10 @@ fn walk(directory: &Path, paths: &mut Vec<PathBuf>) {
         let path = entry.expect("an entry").path();
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
         if !path.is_dir() {
-            paths.push(path);
+            // In a further work tree, .git is a file that says where the repository is.
+            if name != ".git" {
+                paths.push(path);
+            }
         // Cargo marks its target directories, whatever they are called.
         } else if !MADE.contains(&name) && !path.join("CACHEDIR.TAG").exists() {
             walk(&path, paths);

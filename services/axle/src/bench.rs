@@ -3,6 +3,7 @@
 //! Ratios are taken side by side in one run: one round of Axle, one round of bare Zenoh, and so on, through the same
 //! router and between the same processes. Single times on a shared machine say little; their ratios hold.
 
+mod cases;
 pub(crate) mod motion;
 mod process;
 pub(crate) mod stop;

@@ -1,39 +1,44 @@
-//! Charts: paths in the plane and wheel distances over time, as one SVG text.
+//! Charts: paths in the plane, and what the wheels do over time, as one SVG text.
 //!
 //! Whatever numbers come, the picture is valid and of bounded size: points that are not finite or absurdly far are left
 //! out, long series are thinned out to what can be seen, and names are escaped. The plane has the same scale in both
 //! directions, so that a square looks square.
 
 mod page;
+mod panel;
 mod paths;
 mod thin;
-mod wheels;
+
+pub(crate) use panel::Panel;
+pub(crate) use paths::MAX_SERIES;
 
 use anyhow::Context as _;
 use page::Page;
 
-/// A path with a name: points in metres, in the order of driving. The first path of a chart is drawn widest and
-/// palest, so that the next ones can be seen on it: give planned, true, estimated.
+/// A path with a name: points in metres, in the order of driving.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PathSeries {
     /// What the legend calls it.
     pub(crate) name: String,
     /// x forward, y left.
     pub(crate) points: Vec<(f64, f64)>,
+    /// 0 is drawn widest and palest, so that the others can be seen on it; the others differ in their hue. Paths are
+    /// drawn in the order in which they are given.
+    pub(crate) ink: usize,
 }
 
-/// Distances of both wheels at a time.
+/// Something of both wheels at a time.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct WheelPoint {
-    /// Seconds since the task began.
+    /// Seconds since the beginning.
     pub(crate) time: f64,
-    /// Metres of the left wheel.
+    /// Metres, or m/s, of the left wheel.
     pub(crate) left: f64,
-    /// Metres of the right wheel.
+    /// Metres, or m/s, of the right wheel.
     pub(crate) right: f64,
 }
 
-/// What the wheels should have done, and what they did.
+/// How far the wheels should have come, and how far they came.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Wheels {
     /// As the plan wants it.
@@ -45,21 +50,21 @@ pub(crate) struct Wheels {
 impl PathSeries {
     /// What a planner wants the robot to drive.
     pub(crate) fn planned(points: Vec<(f64, f64)>) -> Self {
-        Self { name: "planned".to_owned(), points }
+        Self { name: "planned".to_owned(), points, ink: 0 }
     }
     /// Where the robot really was, which only an emulator knows.
     pub(crate) fn driven(points: Vec<(f64, f64)>) -> Self {
-        Self { name: "true".to_owned(), points }
+        Self { name: "true".to_owned(), points, ink: 1 }
     }
     /// Where the robot believed to be.
     pub(crate) fn estimated(points: Vec<(f64, f64)>) -> Self {
-        Self { name: "estimated".to_owned(), points }
+        Self { name: "estimated".to_owned(), points, ink: 2 }
     }
 }
 
 /// The paths alone.
 pub(crate) fn path_chart(paths: &[PathSeries], way_points: &[(f64, f64)]) -> anyhow::Result<String> {
-    draw("The path in the plane", paths, way_points, None).context("draw the chart")
+    chart("The path in the plane", paths, way_points, &[])
 }
 
 /// The paths, and below them the distances of the wheels.
@@ -69,23 +74,30 @@ pub(crate) fn demo_chart(
     way_points: &[(f64, f64)],
     wheels: &Wheels,
 ) -> anyhow::Result<String> {
-    draw(title, paths, way_points, Some(wheels)).context("draw the chart")
+    chart(title, paths, way_points, &[Panel::due_and_real(wheels)])
 }
 
-fn draw(
+/// The paths, and below them some panels.
+pub(crate) fn chart(
     title: &str,
     paths: &[PathSeries],
     way_points: &[(f64, f64)],
-    wheels: Option<&Wheels>,
+    panels: &[Panel],
 ) -> anyhow::Result<String> {
     let plane = paths::Plane::new(paths, way_points);
-    let below = if wheels.is_some() { wheels::HEIGHT } else { 0 };
+    let below: u32 = panels.iter().map(|_| panel::HEIGHT).sum();
     let mut page = Page::new(title, plane.height() + below);
-    page.draw(|sheet| {
-        let (upper, lower) = sheet.split_at(plane.height());
+    let drawn = page.draw(|sheet| {
+        let (upper, mut rest) = sheet.split_at(plane.height());
         plane.draw(&upper)?;
-        wheels.map_or(Ok(()), |wheels| wheels::draw(wheels, &lower))
-    })?;
+        for panel in panels {
+            let (here, below) = rest.split_at(panel::HEIGHT);
+            panel.draw(&here)?;
+            rest = below;
+        }
+        Ok(())
+    });
+    drawn.context("draw the chart")?;
     Ok(page.into_svg())
 }
 

@@ -1,6 +1,9 @@
 //! The command line.
 
 pub(crate) mod drive;
+mod lines;
+
+pub(crate) use lines::{Chart, Convert};
 
 use crate::settings::Settings;
 use axle_schema::{Pose, Refusal, WayTask};
@@ -52,6 +55,8 @@ pub(crate) enum Command {
     Tap(Tap),
     /// Convert JSON lines: movements to poses, encoder readings to spans, and every other arrow of the map
     Convert(Convert),
+    /// Draw JSON lines or a recording as SVG: the path, and what the wheels do over time
+    Chart(Chart),
     /// Print the parameters of a service with their explanations
     Params {
         /// The service
@@ -231,46 +236,6 @@ pub(crate) struct Tap {
     /// Print the bandwidth of each stream, once a second
     #[arg(long)]
     pub(crate) bw: bool,
-}
-
-/// Arguments of `axle convert`.
-#[derive(Debug, clap::Args)]
-pub(crate) struct Convert {
-    /// What comes in: dwm, geometry, encoders-data, encoders-span, navigator-data, navigator-span, halves
-    #[arg(required_unless_present = "map", requires = "to")]
-    pub(crate) from: Option<String>,
-    /// What goes out; beyond these, dwm can become a pose
-    pub(crate) to: Option<String>,
-    /// Print the map of conversions
-    #[arg(long)]
-    pub(crate) map: bool,
-    /// The distance between the wheels in metres, where a line has no "track"
-    #[arg(long, value_name = "METRES", allow_hyphen_values = true)]
-    pub(crate) track: Option<f64>,
-    /// The measurement to accumulate from, in JSON [default: zero]
-    #[arg(long, value_name = "JSON")]
-    pub(crate) start: Option<String>,
-    /// The time between two poses, in seconds
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.05, allow_hyphen_values = true)]
-    pub(crate) step: f64,
-    /// How far from a geometry a movement may be, in metres
-    #[arg(long, value_name = "METRES", default_value_t = 1e-6, allow_hyphen_values = true)]
-    pub(crate) position_tolerance: f64,
-    /// How far from the direction of a geometry a movement may head, in radians
-    #[arg(long, value_name = "RADIANS", default_value_t = 1e-6, allow_hyphen_values = true)]
-    pub(crate) heading_tolerance: f64,
-    /// The wheel speeds at the beginning of the first span, in m/s; each movement starts where the last ended
-    #[arg(
-        long,
-        value_name = "LEFT,RIGHT",
-        value_delimiter = ',',
-        allow_hyphen_values = true,
-        conflicts_with = "chain"
-    )]
-    pub(crate) speeds: Option<Vec<f64>>,
-    /// Make one chain of all spans, without a jump of a speed and as smooth as can be
-    #[arg(long)]
-    pub(crate) chain: bool,
 }
 
 /// The benches.

@@ -1,5 +1,6 @@
 //! The commands: one file each.
 
+mod chart;
 mod convert;
 mod docs;
 mod drive;
@@ -36,6 +37,7 @@ pub(crate) async fn dispatch(cli: Cli) -> anyhow::Result<()> {
         Command::Conform(args) => conform::conform(&settings, &args).await,
         Command::Tap(args) => tap::tap(&settings, &args).await,
         Command::Convert(args) => convert::convert(&args),
+        Command::Chart(args) => chart::draw(&args),
         Command::Params { service } => {
             let entry = catalog::find(&service).ok_or_else(|| unknown_service(&service))?;
             Ok(data(entry.params.trim_end())?)

@@ -11,6 +11,7 @@ mod cli;
 mod command;
 mod conform;
 mod demo;
+mod lines;
 mod out;
 mod params;
 mod path;

@@ -145,8 +145,17 @@ impl<'a> Sheet<'a> {
     /// The plot with its axes, and the column of the legend.
     pub(super) fn columns(&self) -> (Area<'a>, Legend<'a>) {
         let (plot, legend) = self.0.split_horizontally(px(LEFT + PLOT));
-        (plot, Legend { area: legend, next: 12.0 })
+        (plot, Legend { area: legend, next: f64::from(ABOVE) })
     }
+}
+
+/// Pixels from one entry of a legend to the next, and above the first.
+const ENTRY: u32 = 22;
+const ABOVE: u32 = 12;
+
+/// The height of a legend of so many entries, in pixels.
+pub(super) fn legend_height(entries: usize) -> u32 {
+    ABOVE + ENTRY * u32::try_from(entries).unwrap_or(u32::MAX / 2 / ENTRY)
 }
 
 /// The legend: one line for each entry, from top to bottom.
@@ -172,7 +181,7 @@ impl Legend<'_> {
     }
     fn entry(&mut self, name: &str) -> anyhow::Result<i32> {
         let y = at(self.next);
-        self.next += 22.0;
+        self.next += f64::from(ENTRY);
         let style = font(12.0).pos(RIGHT_OF);
         self.area.draw(&Text::new(clean(name, 19), (at(52.0), y), style)).map_err(failed)?;
         Ok(y)

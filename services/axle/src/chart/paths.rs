@@ -10,7 +10,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 /// The most series of one chart.
-const MAX_SERIES: usize = 10;
+pub(crate) const MAX_SERIES: usize = 10;
 /// The most way points that are marked, and the most that all have a number.
 const MAX_MARKS: usize = 500;
 const FEW: usize = 60;
@@ -41,6 +41,8 @@ impl<'a> Plane<'a> {
         // A long thin path gets a low plot; never one that is too low for its axis.
         let ratio = if wide > 0.0 { tall / wide } else { tall.clamp(0.4, 1.0) };
         let height = (f64::from(PLOT) * ratio).clamp(HEIGHTS[0], HEIGHTS[1]);
+        // Below the paths the legend has start, end and way point.
+        let height = height.max(f64::from(page::legend_height(paths.len() + 3) - page::BOTTOM));
         let pixel = (wide / f64::from(PLOT)).max(tall / height) / SHARE;
         // A single point has no extent: a metre around it shows where it is.
         let pixel = if pixel > 0.0 { pixel.max(1e-5) } else { 1.2 / height };
@@ -62,25 +64,28 @@ impl<'a> Plane<'a> {
         let y = self.centre.1 - half.1..self.centre.1 + half.1;
         let mut chart = page::plot(&area, self.height, (x, "x, forward (m)"), (y, "y, left (m)"))?;
         let mut ends = Vec::new();
-        for (index, path) in self.paths.iter().enumerate() {
+        for path in self.paths {
             let points = thin(&path.points, (self.pixel, self.pixel));
-            ends.extend(points.first().map(|&first| (first, index, true)));
-            ends.extend(points.last().map(|&last| (last, index, false)));
-            chart.draw_series(LineSeries::new(points, style(index))).map_err(failed)?;
-            legend.line(style(index), &path.name)?;
+            if let (Some(&first), Some(&last)) = (points.first(), points.last()) {
+                ends.push((first, last, path.ink));
+            }
+            chart.draw_series(LineSeries::new(points, style(path.ink))).map_err(failed)?;
+            legend.line(style(path.ink), &path.name)?;
         }
         let plot = chart.plotting_area().strip_coord_spec();
         let place = |point: (f64, f64)| self.place(point);
-        if let Some(&(first, ..)) = ends.first() {
-            start(&plot, place(first))?;
-            legend.mark("start", start)?;
-        }
-        for &(last, index, begins) in &ends {
-            if !begins {
-                end(&plot, place(last), ink(index))?;
+        // Paths that begin together have one mark.
+        let mut begun: Vec<(f64, f64)> = Vec::new();
+        for &(first, last, ink) in &ends {
+            let near = |other: &(f64, f64)| (first.0 - other.0).hypot(first.1 - other.1) < 6.0 * self.pixel;
+            if !begun.iter().any(near) {
+                start(&plot, place(first))?;
+                begun.push(first);
             }
+            end(&plot, place(last), self::ink(ink))?;
         }
         if !ends.is_empty() {
+            legend.mark("start", start)?;
             legend.mark("end of a path", |area, place| end(area, place, INK))?;
         }
         if !self.way_points.is_empty() {
@@ -133,9 +138,9 @@ impl<'a> Plane<'a> {
     }
 }
 
-fn ink(index: usize) -> RGBColor {
-    const INKS: [RGBColor; 7] = [GREY, BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY];
-    INKS[index % INKS.len()]
+pub(super) fn ink(index: usize) -> RGBColor {
+    const INKS: [RGBColor; 6] = [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY];
+    index.checked_sub(1).map_or(GREY, |index| INKS[index % INKS.len()])
 }
 
 /// Each line is thinner than those below it.
@@ -151,6 +156,8 @@ fn start(area: &Area<'_>, place: (i32, i32)) -> anyhow::Result<()> {
 fn end(area: &Area<'_>, (x, y): (i32, i32), ink: RGBColor) -> anyhow::Result<()> {
     let r = at(6.0);
     let square = [(x - r, y - r), (x + r, y - r), (x + r, y + r), (x - r, y + r), (x - r, y - r)];
+    // A white rim, so that it is seen on a path of its own ink too.
+    area.draw(&PathElement::new(square, line(WHITE.into(), 50))).map_err(failed)?;
     area.draw(&PathElement::new(square, line(ink.into(), 20))).map_err(failed)
 }
 

@@ -154,8 +154,9 @@ fn a_chart_has_a_bounded_size() {
         (angle.cos() * f64::from(index), angle.sin() * f64::from(index) * 0.6)
     };
     let points: Vec<_> = (0..100_000).map(spiral).collect();
-    let series: Vec<_> =
-        (0..50).map(|index| PathSeries { name: format!("path {index}"), points: points.clone() }).collect();
+    let series: Vec<_> = (0..50)
+        .map(|index| PathSeries { name: format!("path {index}"), points: points.clone(), ink: index })
+        .collect();
     let svg = demo_chart(&"title ".repeat(1000), &series, &points, &wheels(100_000)).expect("a chart");
     check_xml(&svg);
     assert!(svg.len() < 700_000, "{} bytes", svg.len());
@@ -178,7 +179,7 @@ fn names_are_escaped_and_cut() {
     let name = "<script>&\"'\u{1b}[31m\u{0} \u{ffff} of a very long name".to_owned();
     let svg = demo_chart(
         &name,
-        &[PathSeries { name: name.clone(), points: SQUARE.to_vec() }],
+        &[PathSeries { name: name.clone(), points: SQUARE.to_vec(), ink: 1 }],
         &[],
         &Wheels::default(),
     );

@@ -7,12 +7,10 @@
 mod arrows;
 
 use crate::cli::Convert;
+use crate::lines::Lines;
 use crate::out::{data, note, usage};
 use arrows::{ARROWS, Arrow, Work};
-use std::io::{self, BufRead, BufReader, Read as _, Write};
-
-/// The longest line that is read, in bytes: no datum of the map needs a tenth of it.
-const LONGEST: u64 = 64 * 1024;
+use std::io::{self, Write};
 
 /// Converts stdin to stdout, or prints the map.
 pub(crate) fn convert(args: &Convert) -> anyhow::Result<()> {
@@ -23,7 +21,7 @@ pub(crate) fn convert(args: &Convert) -> anyhow::Result<()> {
         usage(format!("there is no arrow from {from:?} to {to:?}; `axle convert --map` shows all"))
     })?;
     let work = arrow.work(args).map_err(usage)?;
-    let (lines, bad) = pump(BufReader::new(io::stdin().lock()), &mut io::stdout().lock(), work, &mut note)?;
+    let (lines, bad) = pump(Lines::new(io::stdin().lock()), &mut io::stdout().lock(), work, &mut note)?;
     anyhow::ensure!(bad == 0, "{bad} of {lines} lines could not be converted");
     Ok(())
 }
@@ -31,7 +29,7 @@ pub(crate) fn convert(args: &Convert) -> anyhow::Result<()> {
 /// Every arrow, in a table.
 fn map() -> String {
     let line =
-        |Arrow { from, to, takes, about, .. }: &Arrow| format!("{from:<15} -> {to:<16} {takes:<24} {about}");
+        |Arrow { from, to, takes, about, .. }: &Arrow| format!("{from:<15} -> {to:<16} {takes:<29} {about}");
     let arrows: Vec<_> = ARROWS.iter().map(line).collect();
     format!(
         "{}\n\nEvery line is a JSON object. \"track\" (metres) may stand in the line or be given by --track.\n\
@@ -42,43 +40,23 @@ fn map() -> String {
 
 /// Reads all lines, writes what they become, and gives how many there were and how many were bad.
 fn pump(
-    mut input: BufReader<impl io::Read>,
+    mut lines: Lines<impl io::Read>,
     output: &mut impl Write,
     mut work: Work,
     complain: &mut dyn FnMut(&str),
 ) -> io::Result<(u64, u64)> {
-    let (mut lines, mut bad) = (0, 0);
+    let mut bad = 0;
     let mut output = io::BufWriter::new(output);
-    let mut line = Vec::new();
-    loop {
-        line.clear();
-        if input.by_ref().take(LONGEST).read_until(b'\n', &mut line)? == 0 {
-            break;
-        }
-        lines += 1;
-        let too_long = line.len() as u64 == LONGEST && line.last() != Some(&b'\n');
-        if too_long {
-            skip_line(&mut input)?;
-        }
-        let answer = if too_long {
-            Err(format!("longer than {LONGEST} bytes"))
-        } else if line.trim_ascii().is_empty() {
-            // Blank lines separate nothing and mean nothing.
-            continue;
-        } else {
-            serde_json::from_slice(&line)
-                .map_err(|fault| fault.to_string())
-                .and_then(|value| work.line(&value))
-        };
-        match answer {
+    while let Some(value) = lines.read()? {
+        match value.and_then(|value| work.line(&value)) {
             Ok(answers) => answers.iter().try_for_each(|answer| writeln!(output, "{answer}"))?,
             Err(why) => {
                 bad += 1;
-                complain(&format!("line {lines}: {why}"));
+                complain(&format!("line {}: {why}", lines.number()));
             }
         }
         // Whoever converts a live stream wants each line when it comes.
-        if input.buffer().is_empty() {
+        if lines.waits() {
             output.flush()?;
         }
     }
@@ -90,19 +68,10 @@ fn pump(
         }
     }
     output.flush()?;
-    Ok((lines, bad))
-}
-
-fn skip_line(input: &mut impl BufRead) -> io::Result<()> {
-    let mut rest = Vec::new();
-    loop {
-        rest.clear();
-        let read = input.by_ref().take(LONGEST).read_until(b'\n', &mut rest)?;
-        if read == 0 || rest.last() == Some(&b'\n') {
-            return Ok(());
-        }
-    }
+    Ok((lines.number(), bad))
 }
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+pub(crate) use tests::converted;

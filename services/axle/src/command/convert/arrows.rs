@@ -1,11 +1,12 @@
 //! The arrows of the map: pure functions from JSON to JSON.
 
 use crate::cli::Convert;
+use crate::lines::{curve, read, track, words, write};
 use axle_schema::motion::Shape;
 use axle_schema::refusal::within;
 use axle_schema::series::Datum;
 use axle_schema::{
-    Curve, Dwm, EncodersData, EncodersSpan, Metres, MetresPerSecond, NavigatorData, Radians, Seconds, Sides,
+    Dwm, EncodersData, EncodersSpan, Metres, MetresPerSecond, NavigatorData, Radians, Seconds, Sides,
     Symmetric, Tolerance, Track,
 };
 use serde::de::DeserializeOwned;
@@ -191,14 +192,6 @@ fn many(args: &Convert, convert: impl Fn(&Value, TrackOf<'_>) -> Answer + 'stati
     Ok(Work::Each(Box::new(move |value| convert(value, &|| track(value, otherwise)))))
 }
 
-fn track(value: &Value, otherwise: Option<f64>) -> Result<Track, String> {
-    match (value.get("track"), otherwise) {
-        (Some(track), _) => read(track).map_err(|why| format!("track: {why}")),
-        (None, Some(track)) => Track::new(Metres(track)).map_err(words),
-        (None, None) => Err("missing field `track`; write it into the line or give --track".into()),
-    }
-}
-
 fn spread<D: Datum<Span: Serialize> + DeserializeOwned + 'static>() -> Work {
     let mut last: Option<D> = None;
     Work::Series(Box::new(move |value| {
@@ -244,17 +237,6 @@ fn join<S: Symmetric<Half: DeserializeOwned> + Serialize>(
     _: TrackOf<'_>,
 ) -> Result<String, String> {
     write(&S::join(read(value)?).map_err(words)?)
-}
-
-fn curve(value: &Value) -> Result<Curve, String> {
-    // The track is about the robot, and stands beside the curve.
-    let mut value = value.clone();
-    if let Value::Object(fields) = &mut value {
-        fields.remove("track");
-    }
-    let curve: Curve = read(&value)?;
-    curve.check().map_err(words)?;
-    Ok(curve)
 }
 
 // ---- The state at a time ---------------------------------------------------------------------------------------------
@@ -316,19 +298,4 @@ const fn name(shape: Shape) -> &'static str {
         Shape::Spiral => "spiral",
         Shape::Clothoid => "clothoid",
     }
-}
-
-// ---- JSON ------------------------------------------------------------------------------------------------------------
-
-fn read<T: DeserializeOwned>(value: &Value) -> Result<T, String> {
-    T::deserialize(value).map_err(|fault| fault.to_string())
-}
-
-fn write<T: Serialize>(value: &T) -> Result<String, String> {
-    serde_json::to_string(value).map_err(|fault| fault.to_string())
-}
-
-#[allow(clippy::needless_pass_by_value, reason = "it stands in map_err")]
-fn words(refusal: axle_schema::Refusal) -> String {
-    refusal.to_string()
 }

@@ -15,10 +15,17 @@ fn run(words: &str, input: &str) -> (Vec<String>, Vec<String>, u64) {
     let work = arrow.unwrap().work(&args).unwrap();
     let (mut out, mut complaints) = (Vec::new(), Vec::new());
     let (_, bad) =
-        pump(BufReader::new(input.as_bytes()), &mut out, work, &mut |words| complaints.push(words.into()))
+        pump(Lines::new(input.as_bytes()), &mut out, work, &mut |words| complaints.push(words.into()))
             .unwrap();
     let lines = String::from_utf8(out).unwrap().lines().map(str::to_owned).collect();
     (lines, complaints, bad)
+}
+
+/// The lines that `axle convert` with these words makes of good lines.
+pub(crate) fn converted(words: &str, input: &str) -> Vec<String> {
+    let (lines, complaints, _) = run(words, input);
+    assert_eq!(complaints, Vec::<String>::new(), "{words}");
+    lines
 }
 
 fn check(words: &str, input: &str, output: &[&str]) {
