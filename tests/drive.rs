@@ -1,9 +1,12 @@
 //! A robot in software with every service as a process: it drives, and whatever dies or freezes, it stands.
 
 mod authority;
+mod composed;
+mod contract;
 mod faults;
 mod holder;
 mod latch;
+mod teleop;
 
 use crate::harness::{Process, Robot};
 

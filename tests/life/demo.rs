@@ -52,7 +52,7 @@ async fn the_demo_says_all_that_is_promised_as_json() {
     let world = World::new().await;
     let demo =
         driven(|| world.axle(&["demo", "--json", "--way", WAY, "--out", "shown", "--seed", "7"])).await;
-    let json = demo.is(0, &["9 processes on tcp/127.0.0.1:"]).json();
+    let json = demo.is(0, &["10 processes on tcp/127.0.0.1:"]).json();
     let keys: Vec<&str> = json.as_object().expect("an object").keys().map(String::as_str).collect();
     let promised = [
         "chart",
@@ -115,7 +115,7 @@ async fn the_demo_shows_a_table_to_people_and_may_be_repeated() {
 async fn a_demo_that_is_interrupted_leaves_no_process() {
     let world = World::new().await;
     let mut demo = world.axle(&["demo", "--way", "4,0"]);
-    demo.says("9 processes on").await;
+    demo.says("10 processes on").await;
     let pids = children(demo.pid());
     assert_eq!(pids.len(), 9);
     demo.tell(Signal::SIGINT);

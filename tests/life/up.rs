@@ -9,8 +9,17 @@ use nix::unistd::Pid;
 use std::time::{Duration, Instant};
 
 /// The services of the shipped topology; the router has no presence.
-const KINDS: [&str; 8] =
-    ["pathfinder", "pathdriver", "emulator", "source", "navigator", "d-corrector", "pilot", "recorder"];
+const KINDS: [&str; 9] = [
+    "pathfinder",
+    "pathdriver",
+    "emulator",
+    "source",
+    "navigator",
+    "d-corrector",
+    "pilot",
+    "drive",
+    "recorder",
+];
 /// The design allows two seconds to end everything.
 const ENDING: Duration = Duration::from_secs(2);
 /// What a loaded machine adds to it.
@@ -21,9 +30,9 @@ async fn up(world: &World) -> (Process, Mesh, Vec<u32>) {
     let up = world.axle(&["up", "--listen", &world.endpoint]);
     let mesh = world.join().await;
     all_alive(&mesh, &KINDS).await;
-    up.says("all 9 processes are alive").await;
+    up.says("all 10 processes are alive").await;
     let pids = children(up.pid());
-    assert_eq!(pids.len(), 9, "eight services and the router");
+    assert_eq!(pids.len(), 10, "nine services and the router");
     (up, mesh, pids)
 }
 
