@@ -2,9 +2,9 @@
 
 use crate::rig::{Rig, distance, enable, holding, power, rotate, speed, stop};
 use crate::{Out, Reply, Request};
+use axle_correctors::{DCorrector, DParams};
 use axle_schema::command::{BrakeCause, Class, Motion};
 use axle_schema::differential_drive::{DriveOperation, DriveStage, DriveState};
-use axle_correctors::{DCorrector, DParams};
 use axle_schema::{Metres, Refusal, Seconds, StopId};
 
 fn state(rig: &mut Rig) -> DriveState {
@@ -246,7 +246,10 @@ fn a_request_at_the_start_waits_for_the_first_word_of_the_gate() {
     facade.ask(Seconds(10.0), 1, 0, power(0.1, 0.1));
     facade.beat(Seconds(11.6));
     let outs = facade.outs();
-    assert!(matches!(&outs[..], [Out::Answer(1, Err(Refusal::Unavailable { .. }))]), "there is none: {outs:?}");
+    assert!(
+        matches!(&outs[..], [Out::Answer(1, Err(Refusal::Unavailable { .. }))]),
+        "there is none: {outs:?}"
+    );
 }
 
 #[test]

@@ -201,7 +201,8 @@ impl<C: Corrector<Plan = Drive>> Facade<C> {
     ///
     /// The answer is an [`Out::Answer`], now or when the gate has answered.
     pub fn ask(&mut self, now: Seconds, ticket: Ticket, bits: u64, request: Request) {
-        let is_stop = matches!(request, Request::Stop(_) | Request::Enable(EnableDrive { enable: false, .. }));
+        let is_stop =
+            matches!(request, Request::Stop(_) | Request::Enable(EnableDrive { enable: false, .. }));
         if self.is_young(now) && !is_stop && self.early.len() < MOST_WAITING {
             self.early.push_back((ticket, bits, request));
             return;
@@ -339,7 +340,8 @@ impl<C: Corrector<Plan = Drive>> Facade<C> {
     }
 
     fn refuse_waiting(&mut self, refusal: &Refusal) {
-        for (ticket, _) in std::mem::take(&mut self.waiting) {
+        let early = std::mem::take(&mut self.early).into_iter().map(|(ticket, ..)| ticket);
+        for ticket in early.chain(std::mem::take(&mut self.waiting).into_iter().map(|(ticket, _)| ticket)) {
             self.outs.push(Out::Answer(ticket, Err(refusal.clone())));
         }
     }
