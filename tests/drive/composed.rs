@@ -58,9 +58,9 @@ impl Composed {
         let pid = i32::try_from(self.alive[service].pid).expect("a process id");
         kill(Pid::from_raw(pid), Signal::SIGKILL).expect("it was alive");
     }
-    /// Turns both wheels until somebody ends it, and waits until they turn.
-    async fn turning(&self) -> Process {
-        let client = self.world.tool(&["drive", "power", "0.4", "0.4", "--for", "60"]);
+    /// Starts what turns both wheels for long, and waits until they turn.
+    async fn turning(&self, args: &[&str]) -> Process {
+        let client = self.world.tool(&[&["drive"], args].concat());
         let fast = |reading: &MotorReading| reading.power.is_some_and(|power| power.get() > 0.2);
         next(&self.motors.left, "the left wheel turns", fast).await;
         next(&self.motors.right, "the right wheel turns", fast).await;
@@ -128,7 +128,7 @@ async fn two_motors_and_two_encoders_drive_as_one_robot() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_motor_that_is_killed_stops_the_other_one_and_disables_the_drive() {
     let composed = Composed::new().await;
-    let mut client = composed.turning().await;
+    let mut client = composed.turning(&["power", "0.4", "0.4", "--for", "60"]).await;
     composed.kill("motor-left");
     // The other one brakes from 0.32 m/s with 2 m/s², after 0.25 s of silence at the most.
     comes_to_rest(&composed.motors.right, "the right wheel", 0.25 + 0.16 + 0.6).await;
@@ -145,11 +145,12 @@ async fn a_motor_that_is_killed_stops_the_other_one_and_disables_the_drive() {
 #[tokio::test(flavor = "multi_thread")]
 async fn motors_stop_by_themselves_when_the_owner_of_the_wheels_is_killed() {
     let composed = Composed::new().await;
-    let _client = composed.turning().await;
+    let mut client = composed.turning(&["distance", "20", "--power", "0.4"]).await;
     composed.kill("composed");
     // 0.2 s of silence, and a machine that does other things too.
     tokio::join!(
         comes_to_rest(&composed.motors.left, "the left wheel", 0.2 + 0.4),
         comes_to_rest(&composed.motors.right, "the right wheel", 0.2 + 0.4),
     );
+    client.ended().await.is(1, &["cancelled: "]);
 }

@@ -117,8 +117,13 @@ async fn a_distance_and_a_turn_end_where_they_should_by_the_truth() {
         (before.distance(after).0 - 0.2).abs() < 0.01 && after.y.0 > before.y.0,
         "{before:?} to {after:?}"
     );
-    let state = contract.hears("the wheels were given back", |state| state.motion == Motion::Standing).await;
-    assert_eq!(state.operation, DriveOperation::Idle);
+    let is_over =
+        |state: &DriveState| state.operation == DriveOperation::Idle && state.motion == Motion::Standing;
+    contract.hears("the drive has nothing to do", is_over).await;
+    contract
+        .eyes
+        .hears("the wheels were given back", |state| state.epoch > 0 && state.holder.is_none())
+        .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -80,7 +80,7 @@ async fn the_demo_says_all_that_is_promised_as_json() {
     assert!((2.0..15.0).contains(&number("duration_s")), "{json}");
 
     let processes = json["processes"].as_array().expect("a list");
-    assert_eq!(processes.len(), 9);
+    assert_eq!(processes.len(), 10);
     for process in processes {
         let pid = process["pid"].as_u64().expect("each has run as a process");
         assert!(!is_alive(u32::try_from(pid).expect("a pid")), "{process} is gone");
@@ -117,7 +117,7 @@ async fn a_demo_that_is_interrupted_leaves_no_process() {
     let mut demo = world.axle(&["demo", "--way", "4,0"]);
     demo.says("10 processes on").await;
     let pids = children(demo.pid());
-    assert_eq!(pids.len(), 9);
+    assert_eq!(pids.len(), 10);
     demo.tell(Signal::SIGINT);
     demo.ended().await.is(1, &["cancelled", "demo.log"]);
     eventually("all are gone", || (!pids.iter().any(|pid| is_alive(*pid))).then_some(())).await;

@@ -2,9 +2,10 @@
 
 use crate::rig::{Rig, distance, enable, holding, power, rotate, speed, stop};
 use crate::{Out, Reply, Request};
+use axle_correctors::{DCorrector, DParams};
 use axle_schema::command::{BrakeCause, Class, Motion};
 use axle_schema::differential_drive::{DriveOperation, DriveStage, DriveState};
-use axle_schema::{Metres, Refusal, StopId};
+use axle_schema::{Metres, Refusal, Seconds, StopId};
 
 fn state(rig: &mut Rig) -> DriveState {
     match rig.asked(Request::Get) {
@@ -229,6 +230,29 @@ fn a_stop_that_no_gate_acknowledges_is_repeated_and_then_said() {
 }
 
 #[test]
+fn a_request_at_the_start_waits_for_the_first_word_of_the_gate() {
+    let rig = Rig::new(1);
+    let (params, name) = (crate::DriveParams::default(), "drive".to_owned());
+    let mut facade = crate::Facade::<DCorrector>::new(params, DParams::default(), name).expect("a drive");
+    facade.ask(Seconds(10.0), 1, 0, Request::Get);
+    facade.beat(Seconds(11.0));
+    assert_eq!(facade.outs(), [], "it waits");
+    facade.hear_gate(Seconds(11.1), rig.gate.state(rig.now()));
+    let outs = facade.outs();
+    assert!(outs.iter().any(|out| matches!(out, Out::Answer(1, Ok(Reply::State(_))))), "{outs:?}");
+
+    let (params, name) = (crate::DriveParams::default(), "drive".to_owned());
+    let mut facade = crate::Facade::<DCorrector>::new(params, DParams::default(), name).expect("a drive");
+    facade.ask(Seconds(10.0), 1, 0, power(0.1, 0.1));
+    facade.beat(Seconds(11.6));
+    let outs = facade.outs();
+    assert!(
+        matches!(&outs[..], [Out::Answer(1, Err(Refusal::Unavailable { .. }))]),
+        "there is none: {outs:?}"
+    );
+}
+
+#[test]
 fn the_encoders_count_from_their_reset() {
     let mut rig = Rig::new(1);
     rig.ends(distance(0.3, 0.5));
@@ -245,7 +269,7 @@ fn the_state_is_said_on_change_and_once_a_second() {
     let mut rig = Rig::new(1);
     let updates = |rig: &Rig| -> Vec<f64> {
         let is_update = |(at, out): &(_, Out)| matches!(out, Out::Update(_)).then_some(*at);
-        rig.said.iter().filter_map(is_update).map(|at: axle_schema::Seconds| at.0).collect()
+        rig.said.iter().filter_map(is_update).map(|at: Seconds| at.0).collect()
     };
     rig.run(5.0);
     let idle = updates(&rig);

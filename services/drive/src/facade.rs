@@ -22,6 +22,8 @@ mod beat;
 const MOST_WAITING: usize = 16;
 /// A gate that says nothing for so long is gone; it speaks once a second.
 const GATE_SILENCE: Seconds = Seconds(3.0);
+/// So long after its own start the façade waits for the first word of the gate before it says that there is none.
+const YOUTH: Seconds = Seconds(1.5);
 /// The gate has this long to acknowledge a stop, which is repeated at every beat until then.
 const STOP_PATIENCE: Seconds = Seconds(2.0);
 
@@ -37,6 +39,10 @@ pub struct Facade<C: Corrector<Plan = Drive>> {
     gate: Option<(GateState, Seconds)>,
     odometer: Odometer,
     grip: Grip,
+    /// When it first heard or was asked anything.
+    born: Option<Seconds>,
+    /// Requests that wait for the first word of the gate, with their random bits.
+    early: VecDeque<(Ticket, u64, Request)>,
     /// Requests that wait for the wheels.
     waiting: VecDeque<(Ticket, Wish)>,
     activity: Activity<C>,
@@ -100,6 +106,8 @@ impl<C: Corrector<Plan = Drive>> Facade<C> {
             gate: None,
             odometer: Odometer::default(),
             grip: Grip::Free,
+            born: None,
+            early: VecDeque::new(),
             waiting: VecDeque::new(),
             activity: Activity::Idle,
             commanded: Sides::default(),
@@ -136,6 +144,7 @@ impl<C: Corrector<Plan = Drive>> Facade<C> {
             }
         }
         self.gate = Some((state, now));
+        self.ask_early(now);
         self.let_go_if_lost(now);
         self.say_state(now);
     }
@@ -192,12 +201,31 @@ impl<C: Corrector<Plan = Drive>> Facade<C> {
     ///
     /// The answer is an [`Out::Answer`], now or when the gate has answered.
     pub fn ask(&mut self, now: Seconds, ticket: Ticket, bits: u64, request: Request) {
+        let is_stop =
+            matches!(request, Request::Stop(_) | Request::Enable(EnableDrive { enable: false, .. }));
+        if self.is_young(now) && !is_stop && self.early.len() < MOST_WAITING {
+            self.early.push_back((ticket, bits, request));
+            return;
+        }
         match self.consider(now, ticket, bits, request) {
             Ok(None) => {}
             Ok(Some(reply)) => self.outs.push(Out::Answer(ticket, Ok(reply))),
             Err(refusal) => self.outs.push(Out::Answer(ticket, Err(refusal))),
         }
         self.say_state(now);
+    }
+
+    /// Whether the gate may still say its first word.
+    fn is_young(&mut self, now: Seconds) -> bool {
+        let born = *self.born.get_or_insert(now);
+        self.gate.is_none() && now - born <= YOUTH
+    }
+
+    /// Takes the requests that have waited for the first word of the gate.
+    fn ask_early(&mut self, now: Seconds) {
+        for (ticket, bits, request) in std::mem::take(&mut self.early) {
+            self.ask(now, ticket, bits, request);
+        }
     }
 
     /// The answer, or none if it comes later or was given already.
@@ -312,7 +340,8 @@ impl<C: Corrector<Plan = Drive>> Facade<C> {
     }
 
     fn refuse_waiting(&mut self, refusal: &Refusal) {
-        for (ticket, _) in std::mem::take(&mut self.waiting) {
+        let early = std::mem::take(&mut self.early).into_iter().map(|(ticket, ..)| ticket);
+        for ticket in early.chain(std::mem::take(&mut self.waiting).into_iter().map(|(ticket, _)| ticket)) {
             self.outs.push(Out::Answer(ticket, Err(refusal.clone())));
         }
     }

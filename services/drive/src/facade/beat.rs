@@ -30,6 +30,9 @@ pub(super) struct Headline {
 impl<C: Corrector<Plan = Drive>> Facade<C> {
     /// One beat: says the next command while somebody wants the robot to move, and what has become news.
     pub fn beat(&mut self, now: Seconds) {
+        if !self.is_young(now) {
+            self.ask_early(now);
+        }
         self.repeat_stop(now);
         self.let_go_if_lost(now);
         self.drive(now);
