@@ -22,7 +22,7 @@ use axle_schema::contract::{Account, Bounds, Corrector, Params, Seen, Step};
 use axle_schema::refusal::within;
 use axle_schema::{
     Drive, Drivetrain, Message as _, Metres, MetresPerSecond, Pose, Radians, RadiansPerSecond, Refusal,
-    Seconds, Task, Twist,
+    Seconds, Sides, Task, Twist,
 };
 use serde::{Deserialize, Serialize};
 
@@ -112,8 +112,8 @@ pub struct LtvCorrector {
     /// The robot time at which the plan begins; known from the first beat on.
     zero: Option<Seconds>,
     calm: Since,
-    /// Whether what is left along the way, and of the heading, is left alone after the last movement.
-    rests: (bool, bool),
+    /// Whether a wheel is left alone after the last movement.
+    rests: Sides<bool>,
 }
 
 impl Corrector for LtvCorrector {
@@ -140,7 +140,7 @@ impl Corrector for LtvCorrector {
             body,
             zero: None,
             calm: Since::default(),
-            rests: (true, true),
+            rests: Sides::new(true, true),
         })
     }
 
@@ -191,20 +191,25 @@ impl LtvCorrector {
         if now < self.due.total() + (self.rules.lead + self.rules.period * 2.0).0 {
             return self.body.drive(0.0, 0.0, at);
         }
-        let tolerance = finish.tolerance.0;
-        // What the plan has brought within the tolerance is not touched again.
-        let zone = Zone { tolerance, slowest: self.rules.creep(tolerance), stands: self.rests.0 };
-        let v = finish.speed(error.x.0, zone, self.rules.deceleration());
-        let omega = self.rules.turning(error.heading.0, finish.heading.0, self.rests.1);
-        self.rests = (v.abs() <= 0.0, omega.abs() <= 0.0);
+        // Each wheel has its own way to go, so that none runs to and fro for the sake of the other.
+        let arm = self.params.robot.track.get() / 2.0;
+        let turn = error.heading.0 * arm;
+        let tolerance = finish.tolerance.0.min(finish.heading.0 * arm);
+        let zone = Zone { tolerance, slowest: self.rules.creep(tolerance), stands: false };
+        let deceleration = self.rules.deceleration();
+        let speeds = Sides::new(error.x.0 - turn, error.x.0 + turn)
+            // What the plan has brought within the tolerance is not touched again.
+            .zip(self.rests, |left, stands| finish.speed(left, Zone { stands, ..zone }, deceleration));
+        self.rests = speeds.map(|speed| speed.abs() <= 0.0);
         let goal = self.due.pose(self.due.total(), self.params.robot.track);
         let real = goal.seen_from(self.body.pose());
         let here = real.x.abs() <= finish.tolerance && real.heading.abs() <= finish.heading;
-        let calm = self.calm.holds(here && self.rests == (true, true), self.body.stamp());
+        let calm = self.calm.holds(here && self.rests.left && self.rests.right, self.body.stamp());
         let settled = calm.is_some_and(|time| time >= finish.settle);
         let impatient = now - self.due.total() >= finish.patience.0;
         if !(settled || impatient) {
-            return self.body.drive(v, omega, at);
+            let Twist { v, omega } = Twist::of_wheels(speeds.map(MetresPerSecond), self.params.robot.track);
+            return self.body.drive(v.0, omega.0, at);
         }
         let far = goal.distance(self.body.pose());
         if far > finish.radius || real.heading.0.abs() > finish.heading.0 * NEAR {
