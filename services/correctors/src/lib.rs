@@ -4,6 +4,7 @@
 //! the robot has measured and says the movement of the wheels until the next beat. One file each:
 //!
 //! * [`d`]: the D-corrector follows the distances of both wheels that a drive asks for (paper, III.A);
+//! * [`g`]: the G-corrector keeps the ratio of the wheels over a distance (paper, III.B);
 //! * [`w`]: the W-corrector follows a vector field (paper, III.C);
 //! * [`arc`]: the arc-corrector drives arcs to targets, as the warehouse robot did;
 //! * [`pursuit`] and [`ltv`]: regulated pure pursuit and a linear time-varying regulator, yardsticks from outside.
@@ -20,6 +21,7 @@ pub mod d;
 mod due;
 mod finish;
 mod follow;
+pub mod g;
 pub mod ltv;
 mod newest;
 mod path;
@@ -32,6 +34,7 @@ mod wheels;
 pub use arc::{ArcCorrector, ArcParams};
 pub use d::{DCorrector, DParams};
 pub use finish::Finish;
+pub use g::{GCorrector, GParams};
 pub use ltv::{LtvCorrector, LtvParams};
 pub use newest::Watch;
 pub use pursuit::{PursuitCorrector, PursuitParams};

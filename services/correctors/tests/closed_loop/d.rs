@@ -12,7 +12,7 @@ const TURN: &str = "0,0,2.5";
 fn course(params: &DParams, plant: Plant, typed: &str) -> (Course, f64) {
     let path = way(typed);
     let drive = drive(&path);
-    (run::<DCorrector>(params, plant, &path, &drive), drive.duration.0)
+    (run::<DCorrector>(params, params.period, plant, &path, &drive), drive.duration.0)
 }
 
 fn reached((course, duration): &(Course, f64), worst: f64, what: &str) {

@@ -219,12 +219,14 @@ impl Robot {
     }
 }
 
-/// Drives `plan`, which is `path` in the words of the corrector, to its end.
-pub(crate) fn run<C: Corrector>(params: &C::Params, plant: Plant, path: &Plan, plan: &C::Plan) -> Course
-where
-    C::Plan: Clone,
-{
-    let period = C::period(params);
+/// Drives `plan`, which is `path` in the words of the corrector, to its end, with a beat of `period`.
+pub(crate) fn run<C: Corrector<Plan: Clone>>(
+    params: &C::Params,
+    period: Seconds,
+    plant: Plant,
+    path: &Plan,
+    plan: &C::Plan,
+) -> Course {
     let beat = (period.0 / STEP).round() as usize;
     let goal = path.legs.iter().fold(path.start, |at, leg| leg.geometry.end_from(at));
     let line = points(path);
