@@ -139,7 +139,8 @@ impl<M: Measured> Newest<M> {
             let why = format!("the robot restarted: its clock went back from {was:.3} to {is:.3}");
             return Err(Refusal::Failed { why });
         }
-        let is_new = since.0 > 0.0 && self.doubted.is_none_or(|doubted| next.stamp() > doubted);
+        let is_same = |doubted: Seconds| doubted.0.to_bits() == next.stamp().0.to_bits();
+        let is_new = since.0 > 0.0 && !self.doubted.is_some_and(is_same);
         if !is_new {
             return Ok(None);
         }
@@ -174,5 +175,51 @@ impl<M: Measured> Newest<M> {
     /// Time since the measurement was first seen, by the beats.
     pub(crate) fn age(&self, at: Seconds) -> Seconds {
         at - self.heard
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(stamp: f64, left: f64) -> Option<EncodersData> {
+        Some(EncodersData { stamp: Seconds(stamp), left: Metres(left), right: Metres(0.0) })
+    }
+    fn newest() -> Newest<EncodersData> {
+        let (watch, robot) = (Watch::default(), Drivetrain::default());
+        Newest::new(at(5.0, 0.0), Seconds(0.0), watch, robot).expect("a first measurement")
+    }
+
+    #[test]
+    fn a_single_wrong_measurement_is_passed_over_and_a_third_one_in_a_row_is_too_much() {
+        for wrong in [at(5.1, 3.0), at(5.1, f64::NAN), at(1e9, 0.0), at(f64::INFINITY, 0.0)] {
+            let mut newest = newest();
+            for beat in [0.1, 0.15, 0.2] {
+                assert_eq!(newest.hear(wrong, Seconds(beat)), Ok(None), "{wrong:?} is seen at three beats");
+            }
+            let next = newest.hear(at(5.25, 0.1), Seconds(0.25)).expect("it is good");
+            assert!(next.is_some() && (newest.elapsed().0 - 0.25).abs() < 1e-12, "{wrong:?}");
+        }
+        let mut newest = newest();
+        assert!(
+            newest.hear(at(5.1, 3.0), Seconds(0.1)).is_ok()
+                && newest.hear(at(5.2, 4.0), Seconds(0.2)).is_ok()
+        );
+        let words = newest.hear(at(5.3, 3.0), Seconds(0.3)).expect_err("three").to_string();
+        assert!(
+            words.contains("the distances of the wheels cannot be believed: they jumped by 2.121 m"),
+            "{words}"
+        );
+    }
+
+    #[test]
+    fn silence_and_time_that_is_none_fail() {
+        assert!(newest().hear(at(5.0, 0.0), Seconds(0.5)).is_ok());
+        for (seen, beat) in [(at(5.0, 0.0), 0.51), (None, 0.51), (None, f64::NAN), (at(4.5, 0.0), -1.0)] {
+            let words = newest().hear(seen, Seconds(beat)).expect_err("silence").to_string();
+            assert!(words.contains("silent"), "{words}");
+        }
+        let back = newest().hear(at(3.9, 0.0), Seconds(0.1)).expect_err("a restart").to_string();
+        assert!(back.contains("its clock went back from 5.000 s to 3.900 s"), "{back}");
     }
 }

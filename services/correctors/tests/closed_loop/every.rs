@@ -12,10 +12,13 @@ use axle_correctors::{
 use axle_schema::contract::Corrector;
 use axle_schema::{Drive, Plan, Pose, Seconds, Sides};
 
+/// Drives a plan with beats of a length, and a robot.
+type Drives = Box<dyn Fn(Seconds, Plant, &Plan) -> Course>;
+
 /// A corrector with its parameters, whatever kind of plan it takes.
 struct Runner {
     name: &'static str,
-    drive: Box<dyn Fn(Seconds, Plant, &Plan) -> Course>,
+    drive: Drives,
     /// How far from its goal it may end with an ideal robot and with a real one, m; and how far astray on the way, m.
     ends: (f64, f64),
     astray: f64,

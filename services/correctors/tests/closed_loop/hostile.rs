@@ -4,8 +4,8 @@ use super::plant::{arc, drive, line, plan, turn};
 use axle_correctors::g::Feedback;
 use axle_correctors::w::{Driver, Field};
 use axle_correctors::{
-    ArcCorrector, ArcParams, DCorrector, DParams, GCorrector, GParams, LtvCorrector, LtvParams, PursuitCorrector,
-    PursuitParams, WCorrector, WParams,
+    ArcCorrector, ArcParams, DCorrector, DParams, GCorrector, GParams, LtvCorrector, LtvParams,
+    PursuitCorrector, PursuitParams, WCorrector, WParams,
 };
 use axle_schema::contract::{Corrector, Seen, Step};
 use axle_schema::{
@@ -73,11 +73,6 @@ fn obeys<C: Corrector>(params: &C::Params, plan: C::Plan, beats: &[Beat]) {
         }
         last = dwm.end();
     }
-}
-
-/// Asks of every corrector the same.
-fn every(path: &Plan, mut plans: impl FnMut(&dyn Fn(Plan)), mut drives: impl FnMut(&dyn Fn(axle_schema::Drive))) {
-    let _ = (path, &mut plans, &mut drives);
 }
 
 proptest! {
