@@ -46,8 +46,13 @@ impl Ended {
     /// Whether the gate took the wheels away because this machine was too busy for a corrector's beats: what a gate
     /// is for, and no fault of what is tested.
     pub(crate) fn was_late(&self) -> bool {
-        let words =
-            ["commands came too late", "does not follow", "no measurement for", "it said nothing for"];
+        let words = [
+            "commands came too late",
+            "does not follow",
+            "no measurement for",
+            "have not come for",
+            "it said nothing for",
+        ];
         self.code == Some(1) && words.iter().any(|word| self.err.contains(word))
     }
     /// The one JSON value that it printed.
