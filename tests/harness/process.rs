@@ -50,7 +50,6 @@ impl Ended {
             "commands came too late",
             "does not follow",
             "no measurement for",
-            "have not come for",
             "it said nothing for",
         ];
         self.code == Some(1) && words.iter().any(|word| self.err.contains(word))

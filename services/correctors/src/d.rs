@@ -18,6 +18,7 @@
 //! the robot's clock goes back, and when the goal is missed grossly. Silence then makes the gate brake.
 
 use crate::due::Due;
+use crate::newest::{Newest, Watch};
 use axle_schema::contract::{Account, Bounds, Corrector, Params, Seen, Step};
 use axle_schema::refusal::within;
 use axle_schema::series::Datum as _;
@@ -27,8 +28,6 @@ use axle_schema::{
 };
 use serde::{Deserialize, Serialize};
 
-/// A stamp that goes back by more than this, in s, is of a robot that has restarted; by less, of an old measurement.
-const RESTART: f64 = 1.0;
 /// When patience is over, the goal counts as reached within this many tolerances, and as missed beyond.
 const NEAR: f64 = 5.0;
 
@@ -142,9 +141,7 @@ pub struct DCorrector {
     begin: EncodersData,
     /// The robot time at which the plan begins; known from the first beat on.
     zero: Option<Seconds>,
-    /// The newest measurement, and the beat at which it was first seen.
-    newest: EncodersData,
-    heard: Seconds,
+    newest: Newest<EncodersData>,
     /// The movement that was commanded last.
     last: Dwm,
     /// The stamp since which both wheels are within the tolerance of the goal.
@@ -168,15 +165,14 @@ impl Corrector for DCorrector {
         within("period in s", period.0, 0.01, 0.5)?;
         task.plan.check()?;
         let due = Due::new(task.plan, &params.robot)?;
-        let Some(begin) = seen.encoders else {
-            let hint = "start the service robot or emulator, and look whether it says encoders";
-            return Err(Refusal::unavailable("the distances of the wheels", hint));
-        };
+        // A wheel may be where it should not be by `lost`; a measurement that is farther off is none.
+        let watch = Watch { silence: params.silence, jump: params.lost, ..Watch::default() };
+        let newest = Newest::new(seen.encoders, seen.at, watch, params.robot)?;
         let last = Dwm::steady(due.speeds(0.0), Seconds::ZERO)?;
-        let (params, newest, heard) = (params.clone(), begin, seen.at);
+        let (params, begin) = (params.clone(), *newest.value());
         let (zero, calm, nothing) = (None, None, Sides::new(0.0, 0.0));
         let (sum, before, is_limited) = (nothing, nothing, false);
-        Ok(Self { params, period, due, begin, zero, newest, heard, last, calm, sum, before, is_limited })
+        Ok(Self { params, period, due, begin, zero, newest, last, calm, sum, before, is_limited })
     }
 
     fn step(&mut self, seen: &Seen) -> Step {
@@ -195,8 +191,8 @@ impl Corrector for DCorrector {
         let fraction =
             if self.due.total() > 0.0 { (planned / self.due.total()).clamp(0.0, 1.0) } else { 1.0 };
         Account {
-            stamp: self.newest.stamp,
-            elapsed: self.elapsed(),
+            stamp: self.newest.value().stamp,
+            elapsed: self.newest.elapsed(),
             fraction,
             due: Some(self.due.distances(planned)),
             real: Some(self.real()),
@@ -206,9 +202,9 @@ impl Corrector for DCorrector {
 
 impl DCorrector {
     fn decide(&mut self, seen: &Seen) -> Result<Step, Refusal> {
-        self.hear(seen)?;
+        self.newest.hear(seen.encoders, seen.at)?;
         // The robot time at which the command of this beat will be obeyed.
-        let obeyed = self.elapsed() + (seen.at - self.heard) + self.params.lead;
+        let obeyed = self.newest.elapsed() + self.newest.age(seen.at) + self.params.lead;
         let zero = *self.zero.get_or_insert(obeyed);
         let error = self.due.distances(self.planned()).zip(self.real(), |due, real| due - real);
         self.check_lost(error)?;
@@ -217,29 +213,6 @@ impl DCorrector {
             self.command(target)
         } else {
             self.finish(error)
-        }
-    }
-
-    /// Takes the newest measurement, or fails if there has been none for too long.
-    fn hear(&mut self, seen: &Seen) -> Result<(), Refusal> {
-        if let Some(encoders) = seen.encoders {
-            let since = encoders.stamp - self.newest.stamp;
-            if since.0 > 0.0 {
-                self.newest = encoders;
-                self.heard = seen.at;
-            } else if since.0 < -RESTART {
-                let (was, is) = (self.newest.stamp, encoders.stamp);
-                let why = format!("the robot restarted: its clock went back from {was:.3} to {is:.3}");
-                return Err(Refusal::Failed { why });
-            }
-        }
-        let age = seen.at - self.heard;
-        if age.0 <= self.params.silence.0 {
-            Ok(())
-        } else {
-            Err(Refusal::Failed {
-                why: format!("no measurement for {age:.2}, the robot or the link is silent"),
-            })
         }
     }
 
@@ -257,18 +230,13 @@ impl DCorrector {
         Ok(())
     }
 
-    /// Time since the task began, by the robot's clock at the newest measurement.
-    fn elapsed(&self) -> Seconds {
-        self.newest.stamp - self.begin.stamp
-    }
-
     /// The time of the plan at the newest measurement, s; negative before the first command reaches the wheels.
     fn planned(&self) -> f64 {
-        self.zero.map_or(0.0, |zero| (self.elapsed() - zero).0)
+        self.zero.map_or(0.0, |zero| (self.newest.elapsed() - zero).0)
     }
 
     fn real(&self) -> Sides<Metres> {
-        self.begin.span_to(&self.newest).sides()
+        self.begin.span_to(self.newest.value()).sides()
     }
 
     /// The wheel speeds at the end of the next command, which is obeyed from the time `now` of the plan on, in s.
@@ -313,7 +281,7 @@ impl DCorrector {
     fn finish(&mut self, error: Sides<Metres>) -> Result<Step, Refusal> {
         let DParams { tolerance, settle, patience, .. } = self.params;
         let worst = error.left.abs().max(error.right.abs());
-        let stamp = self.newest.stamp;
+        let stamp = self.newest.value().stamp;
         self.calm = if worst <= tolerance { self.calm.or(Some(stamp)) } else { None };
         let settled = self.calm.is_some_and(|calm| stamp - calm >= settle);
         let impatient = self.planned() - self.due.total() >= patience.0;

@@ -162,7 +162,7 @@ impl<S: Steering> Follower<S> {
         let whole = parts.iter().map(|part| length(part, arm)).sum::<f64>();
         let later = whole - parts.first().map_or(0.0, |part| length(part, arm));
         let (place, calm, progress) = (Place::default(), Since::default(), Progress::new());
-        Ok(Self {
+        let mut follower = Self {
             steering,
             rules,
             body,
@@ -176,7 +176,11 @@ impl<S: Steering> Follower<S> {
             left: whole,
             calm,
             progress,
-        })
+        };
+        if follower.is_skipped() {
+            follower.advance();
+        }
+        Ok(follower)
     }
 
     /// One beat.
@@ -228,15 +232,21 @@ impl<S: Steering> Follower<S> {
         loop {
             self.part += 1;
             (self.place, self.heading) = (Place::default(), None);
-            let Some(part) = self.parts.get(self.part) else { return };
-            self.later -= length(part, arm);
-            let next = self.parts.get(self.part + 1);
-            let long = self.rules.finish.radius.0 * SHORT;
-            let is_skipped = !self.steering.needs_turns()
-                && matches!((part, next), (Part::Turn { .. }, Some(Part::Way(path))) if path.length > long);
-            if !is_skipped {
+            self.later -= self.parts.get(self.part).map_or(0.0, |part| length(part, arm));
+            if !self.is_skipped() {
                 return;
             }
+        }
+    }
+
+    /// Whether the part is a turn that the steering makes by itself, on the long way that follows.
+    fn is_skipped(&self) -> bool {
+        let long = self.rules.finish.radius.0 * SHORT;
+        match (self.parts.get(self.part), self.parts.get(self.part + 1)) {
+            (Some(Part::Turn { .. }), Some(Part::Way(path))) => {
+                !self.steering.needs_turns() && path.length > long
+            }
+            _ => false,
         }
     }
 

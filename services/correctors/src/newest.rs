@@ -128,7 +128,7 @@ impl<M: Measured> Newest<M> {
         if (0.0..=self.watch.silence.0).contains(&age.0) {
             return Ok(before);
         }
-        let why = format!("{} have not come for {age:.2}: the robot or the link is silent", M::NAME);
+        let why = format!("no measurement for {age:.2} of {}, the robot or the link is silent", M::NAME);
         Err(Refusal::Failed { why })
     }
 
@@ -158,7 +158,7 @@ impl<M: Measured> Newest<M> {
             return Ok(None);
         }
         let why = format!(
-            "{} cannot be believed: they jumped by {way:.3} m in {since:.3}, allowed is {reach:.3} m",
+            "measurements of {} cannot be believed: they jumped by {way:.3} m in {since:.3}, allowed is {reach:.3} m",
             M::NAME
         );
         Err(Refusal::Failed { why })
@@ -207,7 +207,7 @@ mod tests {
         );
         let words = newest.hear(at(5.3, 3.0), Seconds(0.3)).expect_err("three").to_string();
         assert!(
-            words.contains("the distances of the wheels cannot be believed: they jumped by 2.121 m"),
+            words.contains("of the distances of the wheels cannot be believed: they jumped by 2.121 m"),
             "{words}"
         );
     }

@@ -213,7 +213,7 @@ impl Path {
 }
 
 /// The most parts that one arc is divided into.
-const MOST_PARTS: f64 = 256.0;
+const MOST_PARTS: f64 = 32.0;
 
 /// A pose of the robot, in the direction of travel, or the other way round.
 pub(crate) fn travel(pose: Pose, forward: bool) -> Pose {

@@ -290,9 +290,12 @@ pub(crate) fn run<C: Corrector<Plan: Clone>>(
 fn points(path: &Plan) -> Vec<Pose> {
     let mut at = path.start;
     let mut points = vec![at];
+    let track = Drivetrain::default().track;
     for leg in &path.legs {
-        let track = Drivetrain::default().track;
-        points.extend(leg.geometry.poses(at, track, Seconds(0.01)).expect("a leg").map(|data| data.pose));
+        // The normalised movement runs at a metre a second, by its faster wheel.
+        let movement = leg.geometry.normalized_dwm(track).expect("a leg");
+        let from = NavigatorData { pose: at, ..NavigatorData::default() };
+        points.extend(movement.poses(from, track, Seconds(0.01)).map(|data| data.pose));
         at = leg.geometry.end_from(at);
     }
     points
