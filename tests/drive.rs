@@ -3,6 +3,7 @@
 mod authority;
 mod composed;
 mod contract;
+mod correctors;
 mod faults;
 mod holder;
 mod latch;

@@ -317,7 +317,8 @@ pub const TABLE: &[Entry] = &[
     GO_DRIVE.entry("Pathdriver's answer for the task."),
     PLAN.entry("Turn way points into geometries."),
     DRIVE.entry("Turn geometries into movements."),
-    corrector_task::<Drive>(ANY_CORRECTOR).entry("A task for a corrector; a D-corrector takes movements."),
+    corrector_task::<Drive>(ANY_CORRECTOR)
+        .entry("A task for a corrector: movements (d, ltv), or a plan, `PlanTask` (all others)."),
     corrector_cancel(ANY_CORRECTOR).entry("End a corrector's task before its time."),
     corrector_progress(ANY_CORRECTOR).entry("What the corrector does at every beat: due against real."),
     LEASE.entry("Get the right to command the wheels."),

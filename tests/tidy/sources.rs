@@ -197,17 +197,21 @@ fn is_too_long(file: &File) -> Findings {
     let is_written =
         [".rs", ".py", ".md", ".toml", ".cddl", ".ci/run"].iter().any(|end| file.path.ends_with(end));
     let lines = file.text.lines().count();
-    let too_long = is_written && lines > MOST_LINES;
+    // Nobody reads a reference from its beginning to its end.
+    let is_generated =
+        file.path.ends_with(".md") && file.text.contains("<!-- Generated from the code by `axle docs`");
+    let too_long = is_written && !is_generated && lines > MOST_LINES;
     if too_long { vec![file.at(lines, "lines are too many: at most 600")] } else { Findings::new() }
 }
 
 #[test]
 fn no_file_is_longer_than_six_hundred_lines() {
     let (long, most) = ("x\n".repeat(MOST_LINES + 1), "x\n".repeat(MOST_LINES));
+    let generated = format!("<!-- Generated from the code by `axle docs`; CI compares it. -->\n{long}");
     prove(
         is_too_long,
         &[("schema/src/a.rs", &long, "a.rs:601"), ("docs/a.md", &long, "601")],
-        &[("schema/src/a.rs", &most), ("tests/data/a.jsonl", &long)],
+        &[("schema/src/a.rs", &most), ("tests/data/a.jsonl", &long), ("docs/a.md", &generated)],
     );
 }
 

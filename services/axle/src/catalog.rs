@@ -4,7 +4,7 @@
 
 use crate::params;
 use crate::run::{self, Context, Running};
-use axle_correctors::DCorrector;
+use axle_correctors::{ArcCorrector, DCorrector, GCorrector, LtvCorrector, PursuitCorrector, WCorrector};
 use axle_pathdriver::Pathdriver;
 use axle_pathfinder::Pathfinder;
 use axle_schema::contract::Params as _;
@@ -24,6 +24,8 @@ pub(crate) enum Scope {
 pub(crate) enum Takes {
     /// Movements.
     Drive,
+    /// Geometries.
+    Plan,
 }
 
 /// One service.
@@ -93,6 +95,31 @@ pub(crate) const CATALOG: &[Entry] = &[
         "d-corrector",
         Takes::Drive,
         "Keeps the wheels at the distances they should have covered.",
+    ),
+    Entry::corrector::<GCorrector>(
+        "g-corrector",
+        Takes::Plan,
+        "Keeps the ratio of the wheels while the leading one covers its distance.",
+    ),
+    Entry::corrector::<WCorrector>(
+        "w-corrector",
+        Takes::Plan,
+        "Drives along a vector field to the ends of the legs, or along them.",
+    ),
+    Entry::corrector::<ArcCorrector>(
+        "arc-corrector",
+        Takes::Plan,
+        "Drives arcs to the ends of the legs, one after the other.",
+    ),
+    Entry::corrector::<PursuitCorrector>(
+        "pursuit-corrector",
+        Takes::Plan,
+        "Pursues a point of the path ahead: regulated pure pursuit.",
+    ),
+    Entry::corrector::<LtvCorrector>(
+        "ltv-corrector",
+        Takes::Drive,
+        "Keeps the robot at the poses that are due: a linear time-varying regulator.",
     ),
     Entry {
         name: "drive",

@@ -1,8 +1,9 @@
 //! The D-corrector: keeps both wheels at the distances that a drive asks for (paper, III.A).
 //!
 //! Hears a [`Task<Drive>`] and [`EncodersData`], says one [`Dwm`] at every beat. The paper's rule rings: its formula
-//! has a pole at -1 for every gain (model.md 4.5, erratum 11). This is the damped form of the model, with both poles
-//! at the parameter `pole`, around the speeds of the plan.
+//! has a pole at -1 for every gain (model.md 4.5, erratum 11). The law `damped` is that of the model, with both poles
+//! at the parameter `pole`, around the speeds of the plan. The law `paper` is the paper's own PID and recurrence,
+//! repaired in their signs only, so that the ringing can be seen: it is for comparison, not for robots.
 //!
 //! *Time.* Due and real distances are compared at the robot's own clock: the state that was due at the stamp of a
 //! measurement against the state that was measured then. So the age of a measurement is no error. Commands do arrive
@@ -17,6 +18,7 @@
 //! the robot's clock goes back, and when the goal is missed grossly. Silence then makes the gate brake.
 
 use crate::due::Due;
+use crate::newest::{Newest, Watch};
 use axle_schema::contract::{Account, Bounds, Corrector, Params, Seen, Step};
 use axle_schema::refusal::within;
 use axle_schema::series::Datum as _;
@@ -26,10 +28,40 @@ use axle_schema::{
 };
 use serde::{Deserialize, Serialize};
 
-/// A stamp that goes back by more than this, in s, is of a robot that has restarted; by less, of an old measurement.
-const RESTART: f64 = 1.0;
 /// When patience is over, the goal counts as reached within this many tolerances, and as missed beyond.
 const NEAR: f64 = 5.0;
+
+/// The beat from which on the pole is that of one beat: delays do not become shorter with the beats. s.
+const POLE_BEAT: f64 = 0.05;
+
+/// The law by which errors become speeds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Law {
+    /// A double pole around the speeds of the plan (model.md 4.5).
+    #[default]
+    Damped,
+    /// The paper's PID and recurrence (III.A), with the signs of model.md, erratum 11.
+    Paper,
+}
+
+/// The gains of the paper's law: the table `[gains]`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Gains {
+    /// gP, of the error, 0.01 to 2.
+    pub proportional: f64,
+    /// gI, of its sum over time, 0 to 20 1/s.
+    pub integral: f64,
+    /// gD, of its change, 0 to 1 s.
+    pub derivative: f64,
+}
+
+impl Default for Gains {
+    fn default() -> Self {
+        Self { proportional: 0.3, integral: 0.0, derivative: 0.0 }
+    }
+}
 
 /// Parameters of the D-corrector: `deploy/params/d-corrector.toml`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -37,8 +69,13 @@ const NEAR: f64 = 5.0;
 pub struct DParams {
     /// Time from beat to beat, 0.01 to 0.5 s.
     pub period: Seconds,
-    /// The double pole of the correction, 0 to 0.95: the share of an error that is left after a beat (model.md 4.5).
+    /// The law by which errors become speeds.
+    pub law: Law,
+    /// The double pole of the damped law, 0 to 0.95: the share of an error that is left after a beat (model.md 4.5), or
+    /// after 50 ms where beats are shorter.
     pub pole: f64,
+    /// The gains of the paper's law.
+    pub gains: Gains,
     /// How long after a measurement the wheels begin to obey the command that it led to, 0 to 1 s.
     pub lead: Seconds,
     /// How close to their distances both wheels must come, 0.0001 to 0.1 m.
@@ -59,7 +96,9 @@ impl Default for DParams {
     fn default() -> Self {
         Self {
             period: Seconds(0.05),
+            law: Law::default(),
             pole: 0.7,
+            gains: Gains::default(),
             lead: Seconds(0.06),
             tolerance: Metres(0.002),
             settle: Seconds(0.2),
@@ -75,6 +114,9 @@ impl Bounds for DParams {
     fn check(&self) -> Result<(), Refusal> {
         within("period in s", self.period.0, 0.01, 0.5)?;
         within("pole", self.pole, 0.0, 0.95)?;
+        within("gains.proportional", self.gains.proportional, 0.01, 2.0)?;
+        within("gains.integral in 1/s", self.gains.integral, 0.0, 20.0)?;
+        within("gains.derivative in s", self.gains.derivative, 0.0, 1.0)?;
         within("lead in s", self.lead.0, 0.0, 1.0)?;
         within("tolerance in m", self.tolerance.0, 1e-4, 0.1)?;
         within("settle in s", self.settle.0, 0.0, 5.0)?;
@@ -99,13 +141,15 @@ pub struct DCorrector {
     begin: EncodersData,
     /// The robot time at which the plan begins; known from the first beat on.
     zero: Option<Seconds>,
-    /// The newest measurement, and the beat at which it was first seen.
-    newest: EncodersData,
-    heard: Seconds,
+    newest: Newest<EncodersData>,
     /// The movement that was commanded last.
     last: Dwm,
     /// The stamp since which both wheels are within the tolerance of the goal.
     calm: Option<Seconds>,
+    /// For the paper's law: the sum of the errors over time, m·s, the last ones, m, and whether a limit held.
+    sum: Sides<f64>,
+    before: Sides<f64>,
+    is_limited: bool,
 }
 
 impl Corrector for DCorrector {
@@ -121,13 +165,14 @@ impl Corrector for DCorrector {
         within("period in s", period.0, 0.01, 0.5)?;
         task.plan.check()?;
         let due = Due::new(task.plan, &params.robot)?;
-        let Some(begin) = seen.encoders else {
-            let hint = "start the service robot or emulator, and look whether it says encoders";
-            return Err(Refusal::unavailable("the distances of the wheels", hint));
-        };
+        // A wheel may be where it should not be by `lost`; a measurement that is farther off is none.
+        let watch = Watch { silence: params.silence, jump: params.lost, ..Watch::default() };
+        let newest = Newest::new(seen.encoders, seen.at, watch, params.robot)?;
         let last = Dwm::steady(due.speeds(0.0), Seconds::ZERO)?;
-        let (params, newest, heard) = (params.clone(), begin, seen.at);
-        Ok(Self { params, period, due, begin, zero: None, newest, heard, last, calm: None })
+        let (params, begin) = (params.clone(), *newest.value());
+        let (zero, calm, nothing) = (None, None, Sides::new(0.0, 0.0));
+        let (sum, before, is_limited) = (nothing, nothing, false);
+        Ok(Self { params, period, due, begin, zero, newest, last, calm, sum, before, is_limited })
     }
 
     fn step(&mut self, seen: &Seen) -> Step {
@@ -146,8 +191,8 @@ impl Corrector for DCorrector {
         let fraction =
             if self.due.total() > 0.0 { (planned / self.due.total()).clamp(0.0, 1.0) } else { 1.0 };
         Account {
-            stamp: self.newest.stamp,
-            elapsed: self.elapsed(),
+            stamp: self.newest.value().stamp,
+            elapsed: self.newest.elapsed(),
             fraction,
             due: Some(self.due.distances(planned)),
             real: Some(self.real()),
@@ -157,39 +202,17 @@ impl Corrector for DCorrector {
 
 impl DCorrector {
     fn decide(&mut self, seen: &Seen) -> Result<Step, Refusal> {
-        self.hear(seen)?;
+        self.newest.hear(seen.encoders, seen.at)?;
         // The robot time at which the command of this beat will be obeyed.
-        let obeyed = self.elapsed() + (seen.at - self.heard) + self.params.lead;
+        let obeyed = self.newest.elapsed() + self.newest.age(seen.at) + self.params.lead;
         let zero = *self.zero.get_or_insert(obeyed);
         let error = self.due.distances(self.planned()).zip(self.real(), |due, real| due - real);
         self.check_lost(error)?;
         if self.planned() < self.due.total() {
-            self.command(self.corrected((obeyed - zero).0, error))
+            let target = self.corrected((obeyed - zero).0, error);
+            self.command(target)
         } else {
             self.finish(error)
-        }
-    }
-
-    /// Takes the newest measurement, or fails if there has been none for too long.
-    fn hear(&mut self, seen: &Seen) -> Result<(), Refusal> {
-        if let Some(encoders) = seen.encoders {
-            let since = encoders.stamp - self.newest.stamp;
-            if since.0 > 0.0 {
-                self.newest = encoders;
-                self.heard = seen.at;
-            } else if since.0 < -RESTART {
-                let (was, is) = (self.newest.stamp, encoders.stamp);
-                let why = format!("the robot restarted: its clock went back from {was:.3} to {is:.3}");
-                return Err(Refusal::Failed { why });
-            }
-        }
-        let age = seen.at - self.heard;
-        if age.0 <= self.params.silence.0 {
-            Ok(())
-        } else {
-            Err(Refusal::Failed {
-                why: format!("no measurement for {age:.2}, the robot or the link is silent"),
-            })
         }
     }
 
@@ -207,26 +230,27 @@ impl DCorrector {
         Ok(())
     }
 
-    /// Time since the task began, by the robot's clock at the newest measurement.
-    fn elapsed(&self) -> Seconds {
-        self.newest.stamp - self.begin.stamp
-    }
-
     /// The time of the plan at the newest measurement, s; negative before the first command reaches the wheels.
     fn planned(&self) -> f64 {
-        self.zero.map_or(0.0, |zero| (self.elapsed() - zero).0)
+        self.zero.map_or(0.0, |zero| (self.newest.elapsed() - zero).0)
     }
 
     fn real(&self) -> Sides<Metres> {
-        self.begin.span_to(&self.newest).sides()
+        self.begin.span_to(self.newest.value()).sides()
     }
 
     /// The wheel speeds at the end of the next command, which is obeyed from the time `now` of the plan on, in s.
-    ///
+    fn corrected(&mut self, now: f64, error: Sides<Metres>) -> Sides<MetresPerSecond> {
+        match self.params.law {
+            Law::Damped => self.damped(now, error),
+            Law::Paper => self.paper(now, error),
+        }
+    }
+
     /// model.md 4.5, with its symbols: e error, w speed beyond that of the plan, ΔT period, p pole.
     /// w' = α e/ΔT - β w, α = (1-p)², β = (1-2p-p²)/2; w is that of the command as it was limited (anti-windup).
-    fn corrected(&self, now: f64, error: Sides<Metres>) -> Sides<MetresPerSecond> {
-        let p = self.params.pole;
+    fn damped(&self, now: f64, error: Sides<Metres>) -> Sides<MetresPerSecond> {
+        let p = self.params.pole.powf((self.period.0 / POLE_BEAT).min(1.0));
         let alpha = (1.0 - p) * (1.0 - p);
         let beta = (1.0 - 2.0 * p - p * p) / 2.0;
         let w = self.last.end().zip(self.due.speeds(now), |commanded, due| commanded - due);
@@ -234,11 +258,30 @@ impl DCorrector {
         next.zip(self.due.speeds(now + self.period.0), |w, due| due + w)
     }
 
+    /// The paper, III.A, with its symbols and the repairs of model.md, erratum 11: c is what the wheels shall cover in
+    /// the next period, the increment of the plan and gP·e + gI·Σe·ΔT + gD·(e - e')/ΔT; v' = 2c/ΔT - v.
+    ///
+    /// The sum stands while a limit holds the wheels back (anti-windup).
+    fn paper(&mut self, now: f64, error: Sides<Metres>) -> Sides<MetresPerSecond> {
+        let (Gains { proportional, integral, derivative }, t) = (self.params.gains, self.period.0);
+        let e = error.map(|error| error.0);
+        if !self.is_limited {
+            self.sum = self.sum.zip(e, |sum, e| sum + e * t);
+        }
+        let change = e.zip(self.before, |e, before| (e - before) / t);
+        self.before = e;
+        let terms = e.zip(self.sum, |e, sum| proportional * e + integral * sum);
+        let terms = terms.zip(change, |terms, change| terms + derivative * change);
+        let increment = self.due.distances(now + t).zip(self.due.distances(now), |then, now| (then - now).0);
+        let c = increment.zip(terms, |increment, terms| increment + terms);
+        c.zip(self.last.end(), |c, v| MetresPerSecond(2.0 * c / t) - v)
+    }
+
     /// What happens after the last movement of the plan, by the stamps: without measurements nothing settles.
     fn finish(&mut self, error: Sides<Metres>) -> Result<Step, Refusal> {
         let DParams { tolerance, settle, patience, .. } = self.params;
         let worst = error.left.abs().max(error.right.abs());
-        let stamp = self.newest.stamp;
+        let stamp = self.newest.value().stamp;
         self.calm = if worst <= tolerance { self.calm.or(Some(stamp)) } else { None };
         let settled = self.calm.is_some_and(|calm| stamp - calm >= settle);
         let impatient = self.planned() - self.due.total() >= patience.0;
@@ -272,6 +315,8 @@ impl DCorrector {
             let to = to.0.clamp(-robot.wheel_speed.0, robot.wheel_speed.0);
             MetresPerSecond(to.clamp(from.0 - most, from.0 + most))
         });
+        let held = end.zip(target, |end, target| (end - target).0.abs());
+        self.is_limited = held.left.max(held.right) > 0.0;
         self.last = Dwm::new(self.last.end(), end, self.period)?;
         Ok(Step::Drive(self.last))
     }

@@ -3,7 +3,7 @@
 use axle_schema::contract::Bounds as _;
 use axle_schema::dwm::MAX_DURATION;
 use axle_schema::refusal::within;
-use axle_schema::{Drive, Drivetrain, Dwm, Metres, MetresPerSecond, Refusal, Seconds, Sides};
+use axle_schema::{Drive, Drivetrain, Dwm, Metres, MetresPerSecond, Pose, Refusal, Seconds, Sides, Track};
 
 /// A drive on a time line that begins with 0.
 #[derive(Clone, Debug)]
@@ -17,6 +17,8 @@ pub(crate) struct Due {
     total: f64,
     /// What the wheels have covered then.
     goal: Sides<Metres>,
+    /// Where the robot is when each movement begins, and at the end; none before [`Due::place`].
+    poses: Vec<Pose>,
 }
 
 impl Due {
@@ -32,6 +34,7 @@ impl Due {
             covered: Vec::with_capacity(drive.dwms.len()),
             total: 0.0,
             goal: Sides::default(),
+            poses: Vec::new(),
         };
         for (index, dwm) in drive.dwms.iter().enumerate() {
             check(index + 1, dwm, robot)?;
@@ -71,6 +74,28 @@ impl Due {
         match self.index(t) {
             Some(index) => self.dwms[index].speeds_at(Seconds(t - self.starts[index])),
             None => self.dwms.first().map(Dwm::start).unwrap_or_default(),
+        }
+    }
+
+    /// Says where the drive begins, so that [`Due::pose`] is known.
+    pub(crate) fn place(&mut self, start: Pose, track: Track) {
+        let mut at = start;
+        self.poses = vec![start];
+        self.poses.extend(self.dwms.iter().map(|dwm| {
+            at = dwm.pose_at(at, track, dwm.duration());
+            at
+        }));
+    }
+
+    /// The pose that is due at `t`: that of the beginning before it, that of the end after it.
+    pub(crate) fn pose(&self, t: f64, track: Track) -> Pose {
+        if t >= self.total {
+            return self.poses.last().copied().unwrap_or_default();
+        }
+        let index = self.index(t).unwrap_or(0);
+        match (self.poses.get(index), self.dwms.get(index)) {
+            (Some(&from), Some(dwm)) => dwm.pose_at(from, track, Seconds(t - self.starts[index])),
+            _ => Pose::default(),
         }
     }
 

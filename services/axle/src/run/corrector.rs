@@ -6,7 +6,7 @@
 
 use super::Context;
 use crate::params::load;
-use axle_correctors::DCorrector;
+use axle_correctors::{ArcCorrector, DCorrector, GCorrector, LtvCorrector, PursuitCorrector, WCorrector};
 use axle_mesh::{Inbox, Mesh, Publisher, Retry};
 use axle_schema::codec::Message;
 use axle_schema::command::{Class, Command, GateState, Lease, LeaseAsk, Release};
@@ -15,7 +15,7 @@ use axle_schema::key;
 use axle_schema::meta::Cause;
 use axle_schema::task::{Cancel, CorrectorProgress, Phase, Task};
 use axle_schema::window::Window;
-use axle_schema::{NavigatorData, Refusal, RobotId, Seconds, TaskId, Tick};
+use axle_schema::{Drive, NavigatorData, Plan, Refusal, RobotId, Seconds, TaskId, Tick};
 use std::time::Duration;
 use tokio::sync::oneshot::{self, error::TryRecvError};
 use tokio::task::JoinHandle;
@@ -27,11 +27,21 @@ pub(crate) trait Driven: Corrector<Plan: Clone + Sync> {
     /// The stream of tasks of the service `service`.
     fn orders(service: &'static str) -> key::Stream<Self::Order>;
 }
-impl Driven for DCorrector {
-    type Order = Task<axle_schema::Drive>;
-    fn orders(service: &'static str) -> key::Stream<Self::Order> {
-        key::corrector_task(service)
-    }
+
+/// The kinds of plans, and who follows them.
+macro_rules! driven {
+    ($($plan:ty: $($corrector:ty),+;)+) => {$($(
+        impl Driven for $corrector {
+            type Order = Task<$plan>;
+            fn orders(service: &'static str) -> key::Stream<Self::Order> {
+                key::corrector_task(service)
+            }
+        }
+    )+)+};
+}
+driven! {
+    Drive: DCorrector, LtvCorrector;
+    Plan: GCorrector, WCorrector, ArcCorrector, PursuitCorrector;
 }
 
 /// How long the gate has to answer.

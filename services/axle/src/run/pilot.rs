@@ -90,8 +90,35 @@ fn unknown_corrector(name: &str) -> Refusal {
 
 /// The lines to one corrector.
 struct Line {
-    orders: Publisher<Task<Drive>>,
+    orders: Orders,
     cancels: Publisher<Cancel>,
+}
+
+/// Where a corrector hears its tasks, by the kind of plan that it follows.
+enum Orders {
+    Drive(Publisher<Task<Drive>>),
+    Plan(Publisher<Task<Plan>>),
+}
+
+impl Orders {
+    fn of(mesh: &Mesh, robot: &RobotId, corrector: &'static str, takes: Takes) -> anyhow::Result<Self> {
+        Ok(match takes {
+            Takes::Drive => Self::Drive(mesh.publisher(&key::corrector_task(corrector).of(robot))?),
+            Takes::Plan => Self::Plan(mesh.publisher(&key::corrector_task(corrector).of(robot))?),
+        })
+    }
+    fn put(&self, order: &Order, cause: Option<Cause>) -> Result<Cause, Refusal> {
+        match self {
+            Self::Drive(orders) => orders.put(&order.drive, cause),
+            Self::Plan(orders) => orders.put(&order.plan, cause),
+        }
+    }
+}
+
+/// A task in the words of every corrector.
+struct Order {
+    plan: Task<Plan>,
+    drive: Task<Drive>,
 }
 
 /// The plans of a task.
@@ -118,7 +145,7 @@ struct Pilot {
     planning: Option<JoinHandle<()>>,
     planned: mpsc::Sender<(TaskId, Result<Planned, Refusal>)>,
     /// The order that the corrector has not answered yet.
-    order: Option<Task<Drive>>,
+    order: Option<Order>,
     /// The latest of way, plan and movements of the task.
     cause: Option<Cause>,
 }
@@ -132,9 +159,10 @@ impl Pilot {
         let mut lines = BTreeMap::new();
         let (word, words) = mpsc::channel(32);
         let (planned, plans) = mpsc::channel(1);
-        for entry in catalog::CATALOG.iter().filter(|entry| entry.takes == Some(Takes::Drive)) {
+        for entry in catalog::CATALOG {
+            let Some(takes) = entry.takes else { continue };
             let line = Line {
-                orders: mesh.publisher(&key::corrector_task::<Drive>(entry.name).of(&robot))?,
+                orders: Orders::of(&mesh, &robot, entry.name, takes)?,
                 cancels: mesh.publisher(&key::corrector_cancel(entry.name).of(&robot))?,
             };
             let progress = mesh.inbox(&key::corrector_progress(entry.name).of(&robot), 32)?;
@@ -284,9 +312,9 @@ impl Pilot {
             Ok(Planned { plan, drive }) => {
                 journey.drive(now);
                 // Each names the one before it: the way caused the plan, the plan the movements, these the order.
-                self.cause = self.say("the plan", self.plans.put(&Task { id, plan }, self.cause));
-                let order = Task { id, plan: drive };
-                self.cause = self.say("the movements", self.drives.put(&order, self.cause));
+                let order = Order { plan: Task { id, plan }, drive: Task { id, plan: drive } };
+                self.cause = self.say("the plan", self.plans.put(&order.plan, self.cause));
+                self.cause = self.say("the movements", self.drives.put(&order.drive, self.cause));
                 self.order = Some(order);
                 self.repeat_order();
                 self.say_progress(now);
