@@ -171,6 +171,32 @@ fn a_stopped_drive_refuses_to_move_until_the_stop_is_quoted() {
 }
 
 #[test]
+fn a_request_that_waits_for_the_wheels_does_not_survive_a_stop() {
+    let mut rig = Rig::new(1);
+    let (powers, way) = (rig.ask(power(0.3, 0.3)), rig.ask(distance(1.0, 0.3)));
+    assert_eq!((rig.answer(powers), rig.answer(way)), (None, None), "the gate has not answered yet");
+    rig.asked(stop()).expect("acknowledged");
+    for ticket in [powers, way] {
+        assert!(matches!(rig.answer(ticket), Some(Err(Refusal::Disabled { .. }))));
+    }
+    rig.run(1.0);
+    assert!(rig.commands().is_empty() && rig.stages().is_empty() && rig.has_given_back());
+}
+
+#[test]
+fn an_operation_begins_from_rest() {
+    let mut rig = Rig::new(1);
+    rig.asked(power(0.6, 0.6)).expect("followed");
+    rig.run(0.6);
+    rig.begins(rotate(90.0, 0.3));
+    rig.run_until("it turns", |rig| rig.truth().pose.heading.0 > 0.1);
+    let from = rig.truth().pose;
+    rig.run_until("the end", |rig| rig.is_at_rest());
+    assert!(rig.truth().pose.distance(from).0 < 0.02, "on the spot");
+    assert!((rig.truth().pose.heading.0.to_degrees() - 90.0).abs() < 1.5, "{:?}", rig.truth().pose);
+}
+
+#[test]
 fn disabling_stops_at_once_and_everybody() {
     let mut rig = Rig::new(1);
     rig.asked(power(0.5, 0.5)).expect("followed");

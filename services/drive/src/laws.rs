@@ -101,6 +101,9 @@ proptest! {
             prop_assert!(change.left.abs().0 <= 2.0 + 1e-9 && change.right.abs().0 <= 2.0 + 1e-9);
             prop_assert!(command.dwm.peak_speed().0 <= 1.0 + 1e-9);
         }
+        for pair in rig.commands().windows(2).filter(|pair| pair[0].1.epoch == pair[1].1.epoch) {
+            prop_assert_eq!(pair[0].1.dwm.end(), pair[1].1.dwm.start(), "no jump, whatever comes after whatever");
+        }
         let rejected = rig.gate.state(rig.now()).rejected;
         prop_assert!(rejected.keys().all(|why| matches!(why, axle_schema::command::Reject::Fenced
             | axle_schema::command::Reject::Disabled)), "the gate obeys what the drive says: {:?}", rejected);
