@@ -147,6 +147,7 @@ pub(crate) async fn join(endpoint: &str, service: &str) -> Mesh {
         host: "lab".into(),
         service: service.into(),
         robot: "r1".into(),
+        inputs: Vec::new(),
     };
     Mesh::join(settings, Patience::AtMost(PATIENCE), |_| {}).await.expect("a router")
 }

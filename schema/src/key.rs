@@ -20,6 +20,9 @@ use crate::{Dwm, EncodersData, Fix, InertialData, NavigatorData, Refusal, Signal
 use std::fmt;
 use std::marker::PhantomData;
 
+mod port;
+pub use port::Port;
+
 /// The first chunk of every key.
 const ROOT: &str = "axle";
 
@@ -388,11 +391,15 @@ pub fn place(key: &str) -> Option<Place<'_>> {
 #[must_use]
 pub fn find(key: &str) -> Option<&'static Entry> {
     let place = place(key)?;
+    find_port(place.service, place.name)
+}
+
+fn find_port(service: &str, name: &str) -> Option<&'static Entry> {
     TABLE.iter().find(|entry| {
-        let corrector = entry.service == ANY_CORRECTOR && place.service.ends_with("-corrector");
-        let is_motor = place.service.starts_with("motor-") || place.service.starts_with("encoder-");
+        let corrector = entry.service == ANY_CORRECTOR && service.ends_with("-corrector");
+        let is_motor = service.starts_with("motor-") || service.starts_with("encoder-");
         let motor = entry.service == ANY_MOTOR && is_motor;
-        (corrector || motor || entry.service == place.service) && entry.name == place.name
+        (corrector || motor || entry.service == service) && entry.name == name
     })
 }
 

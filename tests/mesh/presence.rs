@@ -49,6 +49,7 @@ async fn two_processes_of_one_service_are_two_and_a_strange_host_name_does_no_ha
             host: host.into(),
             service: "navigator".into(),
             robot: "r1".into(),
+            inputs: Vec::new(),
         };
         let mesh = axle_mesh::Mesh::join(settings, axle_mesh::Patience::AtMost(PATIENCE), |_| {}).await;
         let mesh = mesh.expect("a router");

@@ -2,6 +2,10 @@
 //!
 //! A new corrector is one file in `services/correctors` and one line in [`CATALOG`].
 
+mod wires;
+
+pub(crate) use wires::{Wires, is_shared};
+
 use crate::params;
 use crate::run::{self, Context, Running};
 use axle_correctors::{ArcCorrector, DCorrector, GCorrector, LtvCorrector, PursuitCorrector, WCorrector};
@@ -38,6 +42,8 @@ pub(crate) struct Entry {
     pub(crate) scope: Scope,
     /// What it follows, if it is a corrector.
     pub(crate) takes: Option<Takes>,
+    /// What it hears, says, asks and answers, by its name.
+    pub(crate) wires: fn(&'static str) -> Wires,
     /// Its parameters file with all defaults and explanations.
     pub(crate) params: &'static str,
     /// Looks whether it can begin with such a file, without a mesh.
@@ -47,12 +53,17 @@ pub(crate) struct Entry {
 }
 
 impl Entry {
-    const fn functional<F: run::functional::Served>(name: &'static str, about: &'static str) -> Self {
+    const fn functional<F: run::functional::Served>(
+        name: &'static str,
+        about: &'static str,
+        wires: fn(&'static str) -> Wires,
+    ) -> Self {
         Self {
             name,
             about,
             scope: Scope::AllRobots,
             takes: None,
+            wires,
             params: <F::Params as axle_schema::contract::Params>::FILE,
             check: params::check::<F::Params>,
             run: |context| Box::pin(run::functional::run::<F>(context)),
@@ -68,6 +79,7 @@ impl Entry {
             about,
             scope: Scope::OneRobot,
             takes: Some(takes),
+            wires: wires::corrector,
             params: <C::Params as axle_schema::contract::Params>::FILE,
             check: params::check::<C::Params>,
             run: |context| Box::pin(run::corrector::run::<C>(context)),
@@ -82,14 +94,16 @@ pub(crate) const CATALOG: &[Entry] = &[
         about: "Takes a task, has it planned, and sees it through.",
         scope: Scope::OneRobot,
         takes: None,
+        wires: wires::pilot,
         params: axle_pilot::PilotParams::FILE,
         check: run::pilot::check,
         run: |context| Box::pin(run::pilot::run(context)),
     },
-    Entry::functional::<Pathfinder>("pathfinder", "Turns way points into geometries."),
+    Entry::functional::<Pathfinder>("pathfinder", "Turns way points into geometries.", wires::pathfinder),
     Entry::functional::<Pathdriver>(
         "pathdriver",
         "Turns geometries into movements within the robot's limits.",
+        wires::pathdriver,
     ),
     Entry::corrector::<DCorrector>(
         "d-corrector",
@@ -126,6 +140,7 @@ pub(crate) const CATALOG: &[Entry] = &[
         about: "Offers the Generic Differential Drive contract: powers, speeds, distances, degrees.",
         scope: Scope::OneRobot,
         takes: None,
+        wires: wires::drive,
         params: axle_drive::DriveParams::FILE,
         check: params::check::<axle_drive::DriveParams>,
         run: |context| Box::pin(run::drive::run(context)),
@@ -135,6 +150,7 @@ pub(crate) const CATALOG: &[Entry] = &[
         about: "A robot in software, behind its gate.",
         scope: Scope::OneRobot,
         takes: None,
+        wires: wires::emulator,
         params: axle_emulator::EmulatorParams::FILE,
         check: params::check::<axle_emulator::EmulatorParams>,
         run: |context| Box::pin(run::emulator::run(context)),
@@ -144,6 +160,7 @@ pub(crate) const CATALOG: &[Entry] = &[
         about: "Owns the wheels of a robot that is composed of motor and encoder services, behind its gate.",
         scope: Scope::OneRobot,
         takes: None,
+        wires: wires::composed,
         params: run::composed::ComposedParams::FILE,
         check: params::check::<run::composed::ComposedParams>,
         run: |context| Box::pin(run::composed::run(context)),
@@ -153,6 +170,7 @@ pub(crate) const CATALOG: &[Entry] = &[
         about: "The left motor of a composed robot, in software, with its encoder.",
         scope: Scope::OneRobot,
         takes: None,
+        wires: wires::motor,
         params: axle_emulator::MotorParams::FILE,
         check: params::check::<axle_emulator::MotorParams>,
         run: |context| Box::pin(run::motor::run(context, 0)),
@@ -162,6 +180,7 @@ pub(crate) const CATALOG: &[Entry] = &[
         about: "The right motor of a composed robot, in software, with its encoder.",
         scope: Scope::OneRobot,
         takes: None,
+        wires: wires::motor,
         params: axle_emulator::RIGHT_MOTOR,
         check: params::check::<axle_emulator::MotorParams>,
         run: |context| Box::pin(run::motor::run(context, 1)),
@@ -171,6 +190,7 @@ pub(crate) const CATALOG: &[Entry] = &[
         about: "Buffers measurements, and serves the newest and older ones.",
         scope: Scope::OneRobot,
         takes: None,
+        wires: wires::source,
         params: axle_source::SourceParams::FILE,
         check: params::check::<axle_source::SourceParams>,
         run: |context| Box::pin(run::source::run(context)),
@@ -180,6 +200,7 @@ pub(crate) const CATALOG: &[Entry] = &[
         about: "Tells where the robot is, from its encoders.",
         scope: Scope::OneRobot,
         takes: None,
+        wires: wires::navigator,
         params: axle_navigator::NavigatorParams::FILE,
         check: params::check::<axle_navigator::NavigatorParams>,
         run: |context| Box::pin(run::navigator::run(context)),
@@ -189,6 +210,7 @@ pub(crate) const CATALOG: &[Entry] = &[
         about: "Writes everything that is said about a robot to an MCAP file.",
         scope: Scope::OneRobot,
         takes: None,
+        wires: wires::recorder,
         params: axle_recorder::RecorderParams::FILE,
         check: params::check::<axle_recorder::RecorderParams>,
         run: |context| Box::pin(run::recorder::run(context)),

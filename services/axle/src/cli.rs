@@ -49,6 +49,13 @@ pub(crate) enum Command {
     Stop(Stop),
     /// Allow the wheels to move again after a stop
     Enable(Json),
+    /// Check a topology: unknown services, missing inputs, two who say the same
+    Check {
+        /// The topology [default: one emulated robot and its planners]
+        topology: Option<PathBuf>,
+    },
+    /// Draw a topology: services, streams and computers, and what of it is alive
+    Graph(Graph),
     /// Judge a drive by the Generic Differential Drive contract, clause by clause; the robot moves
     Conform(Conform),
     /// Print any stream, decoded, one line a message
@@ -93,6 +100,25 @@ pub(crate) struct Stop {
     /// Print one JSON object a robot
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// `axle graph`.
+#[derive(Clone, Debug, clap::Args)]
+pub(crate) struct Graph {
+    /// The topology [default: one emulated robot and its planners]
+    pub(crate) topology: Option<PathBuf>,
+    /// Mark what is alive, silent or missing on the mesh now
+    #[arg(long)]
+    pub(crate) live: bool,
+    /// Write the picture to a file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) svg: Option<PathBuf>,
+    /// Print one JSON object a wire
+    #[arg(long, conflicts_with = "dot")]
+    pub(crate) json: bool,
+    /// Print it in the language of Graphviz
+    #[arg(long)]
+    pub(crate) dot: bool,
 }
 
 /// `axle conform`.
@@ -149,6 +175,9 @@ pub(crate) struct Up {
 pub(crate) struct Run {
     /// The service; `axle run help` lists them
     pub(crate) service: String,
+    /// Hear a stream from elsewhere; may be given several times
+    #[arg(long, value_name = "STREAM=OTHER")]
+    pub(crate) input: Vec<String>,
     /// Its parameters [default: those that `axle params SERVICE` prints]
     #[arg(long, env = "AXLE_PARAMS", hide_env_values = true, value_name = "FILE")]
     pub(crate) params: Option<PathBuf>,

@@ -1,10 +1,12 @@
 //! The commands: one file each.
 
 mod chart;
+mod check;
 mod convert;
 mod docs;
 mod drive;
 pub(crate) mod go;
+mod graph;
 mod ls;
 mod plan;
 mod ps;
@@ -34,6 +36,8 @@ pub(crate) async fn dispatch(cli: Cli) -> anyhow::Result<()> {
         Command::Drive(args) => drive::drive(&settings, args).await,
         Command::Stop(args) => stop::stop(&settings, &args).await,
         Command::Enable(args) => stop::enable(&settings, args.json).await,
+        Command::Check { topology } => check::check(topology.as_deref()),
+        Command::Graph(args) => graph::graph(&settings, &args).await,
         Command::Conform(args) => conform::conform(&settings, &args).await,
         Command::Tap(args) => tap::tap(&settings, &args).await,
         Command::Convert(args) => convert::convert(&args),

@@ -63,6 +63,7 @@ pub(crate) async fn run(
     entry: &'static Entry,
     settings: &Settings,
     params: Option<PathBuf>,
+    inputs: Vec<(String, String)>,
 ) -> anyhow::Result<()> {
     (entry.check)(params.as_deref())?;
     let mut stop = crate::signal::stop()?;
@@ -70,7 +71,8 @@ pub(crate) async fn run(
         Scope::AllRobots => settings.robot.clone(),
         Scope::OneRobot => Some(settings.one_robot()?),
     };
-    let joining = join(settings.mesh(entry.name, robot.as_ref()), Patience::Forever);
+    let own = axle_mesh::Settings { inputs, ..settings.mesh(entry.name, robot.as_ref()) };
+    let joining = join(own, Patience::Forever);
     let mesh = tokio::select! {
         mesh = joining => mesh?,
         () = stop.wait() => return Ok(()),

@@ -66,6 +66,7 @@ impl Settings {
             host: self.host_name(),
             service: service.to_owned(),
             robot: robot.map_or_else(|| ALL.to_owned(), ToString::to_string),
+            inputs: Vec::new(),
         }
     }
     /// Joins the mesh for a command that a person waits for: an absent router is said within two seconds.

@@ -110,12 +110,22 @@ impl Supervisor {
             robot: None,
             args: ["router", "--listen", endpoint, "--log", level].map(String::from).to_vec(),
         }];
+        let described = topology.hosts.get(host);
+        for link in described.iter().flat_map(|host| &host.links) {
+            jobs[0].args.extend(["--link".into(), link.clone()]);
+        }
+        if described.is_some_and(|host| host.insecure_lan) {
+            jobs[0].args.push("--insecure-lan".into());
+        }
         for (index, service) in topology.services_of(host).enumerate() {
             let mut args = ["run", &service.kind, "--connect", endpoint, "--host", host, "--log", level]
                 .map(String::from)
                 .to_vec();
             if let Some(robot) = &service.robot {
                 args.extend(["--robot".into(), robot.to_string()]);
+            }
+            for (input, from) in &service.inputs {
+                args.extend(["--input".into(), format!("{input}={from}")]);
             }
             let state = state.unwrap_or(&params.0);
             args.extend(["--state".into(), state.display().to_string()]);

@@ -1,5 +1,9 @@
 //! Topologies: which services run on which computer, for which robot, with which parameters.
 
+mod wiring;
+
+pub(crate) use wiring::{Node, Wire, check_inputs};
+
 use crate::catalog::{self, Scope};
 use crate::out::usage;
 use axle_schema::contract::Bounds as _;
@@ -36,8 +40,14 @@ pub(crate) struct RobotName(pub(crate) RobotId);
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Host {
-    /// The router of this computer.
+    /// Where the router of this computer listens; its services connect to it.
     pub(crate) router: String,
+    /// The routers of other computers that it links to. Of two computers one names the other.
+    #[serde(default)]
+    pub(crate) links: Vec<String>,
+    /// Whether the router may listen beyond this computer without encryption; whoever reaches it can drive the robots.
+    #[serde(default)]
+    pub(crate) insecure_lan: bool,
 }
 
 /// A service.
@@ -50,6 +60,10 @@ pub(crate) struct Service {
     pub(crate) host: Option<String>,
     /// The robot it works for; needed for all but planners.
     pub(crate) robot: Option<RobotId>,
+    /// Inputs that come from elsewhere than usual: the stream that it hears, and the one of the same type that it shall
+    /// hear instead.
+    #[serde(default)]
+    pub(crate) inputs: BTreeMap<String, String>,
     /// Parameters that differ from the defaults.
     #[serde(default)]
     pub(crate) params: toml::Table,
@@ -98,6 +112,7 @@ impl Topology {
             if entry.scope == Scope::OneRobot && service.robot.is_none() {
                 anyhow::bail!("{at}: works for one robot; add robot = \"r1\"");
             }
+            check_inputs(&service.inputs, entry).map_err(|fault| fault.context(at.clone()))?;
             match &service.host {
                 Some(host) if !self.hosts.contains_key(host) => anyhow::bail!("{at}: unknown host {host:?}"),
                 None if self.hosts.len() > 1 => anyhow::bail!("{at}: several hosts are named; add host = …"),

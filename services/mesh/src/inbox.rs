@@ -161,13 +161,14 @@ impl Mesh {
     /// # Errors
     /// [`Fault::Declare`].
     pub fn inbox<M: Message>(&self, key: &Key<M>, capacity: usize) -> Result<Inbox<M>, Fault> {
+        let heard_from = self.rewired(key.as_str());
         let cell = Cell::new(capacity);
         let (store, counters) = (Arc::clone(&cell), Arc::clone(&self.counters));
         let oversized = Arc::new(AtomicU64::new(0));
         let count_oversized = Arc::clone(&oversized);
         let subscriber = self
             .session
-            .declare_subscriber(key.as_str().to_owned())
+            .declare_subscriber(heard_from.clone())
             .callback(move |sample| {
                 // An oversized payload is not even stored: it costs no memory and no decoding.
                 if sample.payload().len() > M::LIMIT {
@@ -179,7 +180,7 @@ impl Mesh {
             })
             .wait()
             .map_err(|source| Fault::Declare { key: key.to_string(), source })?;
-        self.counters.note_hears(key.as_str());
+        self.counters.note_hears(&heard_from);
         Ok(Inbox {
             cell,
             oversized,

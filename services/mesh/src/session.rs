@@ -20,6 +20,8 @@ pub struct Settings {
     pub service: String,
     /// The robot it serves, or `all`.
     pub robot: String,
+    /// Streams that it hears from elsewhere: the last two chunks of the usual key, and those of the other one.
+    pub inputs: Vec<(String, String)>,
 }
 
 /// How long to wait for a router.
@@ -38,6 +40,7 @@ pub struct Mesh {
     pub(crate) presence: Arc<Presence>,
     pub(crate) counters: Arc<Counters>,
     pub(crate) version: &'static str,
+    inputs: Arc<[(String, String)]>,
     clock: Clock,
 }
 
@@ -67,6 +70,7 @@ impl Mesh {
                 Err(_) => waiting(started.elapsed()),
             }
         };
+        let inputs = settings.inputs.into();
         let presence = Presence {
             robot: settings.robot,
             service: settings.service,
@@ -78,6 +82,7 @@ impl Mesh {
             session,
             presence: Arc::new(presence),
             counters: Arc::new(Counters::new()),
+            inputs,
             version: env!("CARGO_PKG_VERSION"),
             clock: Clock::start(),
         })
@@ -98,6 +103,15 @@ impl Mesh {
     #[must_use]
     pub const fn clock(&self) -> Clock {
         self.clock
+    }
+    /// The key that is heard for `key`: its own, or where this process was told to hear it from.
+    pub(crate) fn rewired(&self, key: &str) -> String {
+        // The root, the robot, and the rest.
+        let own = key.splitn(3, '/').nth(2).unwrap_or_default();
+        match self.inputs.iter().find(|(input, _)| input == own) {
+            Some((_, from)) => format!("{}{from}", &key[..key.len() - own.len()]),
+            None => key.to_owned(),
+        }
     }
     /// What the process counts of itself.
     #[must_use]

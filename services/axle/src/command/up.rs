@@ -19,6 +19,10 @@ pub(super) async fn up(settings: &Settings, args: Up) -> anyhow::Result<()> {
     let (host, described) = topology.host(settings.host.as_deref())?;
     let endpoint = args.listen.clone().unwrap_or_else(|| described.router.clone());
     check_free(&endpoint)?;
+    // What is missing here may be started by hand; it is said, and not refused.
+    for fault in topology.faults() {
+        note(&format!("{fault} (unless it runs elsewhere)"));
+    }
     let mut stop = crate::signal::stop()?;
     let started = Instant::now();
     let supervisor = Supervisor::start(
