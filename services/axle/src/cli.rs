@@ -2,6 +2,7 @@
 
 pub(crate) mod drive;
 mod lines;
+mod tournament;
 
 pub(crate) use lines::{Chart, Convert};
 
@@ -9,6 +10,7 @@ use crate::settings::Settings;
 use axle_schema::{Pose, Refusal, WayTask};
 use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
+pub(crate) use tournament::Tournament;
 
 /// Services that drive differential-wheeled robots, over Zenoh.
 #[derive(Debug, Parser)]
@@ -57,6 +59,8 @@ pub(crate) enum Command {
     Convert(Convert),
     /// Draw JSON lines or a recording as SVG: the path, and what the wheels do over time
     Chart(Chart),
+    /// Compare the correctors on emulated robots in virtual time, or tune one
+    Tournament(Tournament),
     /// Print the parameters of a service with their explanations
     Params {
         /// The service

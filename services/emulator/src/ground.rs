@@ -54,7 +54,7 @@ impl Grip {
     /// The share of `covered` that the robot moves.
     fn share(&mut self, params: &SlipParams, covered: Metres) -> f64 {
         let share = if self.slips { 1.0 - params.share } else { 1.0 };
-        self.left = self.left - covered.abs();
+        self.left -= covered.abs();
         if self.left <= Metres::ZERO {
             self.slips = !self.slips;
             self.left = if self.slips { params.length } else { next(params, &mut self.random) };

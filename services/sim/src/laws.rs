@@ -224,6 +224,6 @@ proptest! {
         let first = run(&probe, &brief, &world).expect("a run");
         prop_assert_eq!(format!("{first:?}"), format!("{:?}", run(&probe, &brief, &world).expect("a run")));
         prop_assert!(first.values.iter().all(|value| value.is_finite()), "{:?}", first.values);
-        prop_assert_eq!(first.values, run(&d(), &brief, &world).expect("a run").values);
+        prop_assert_eq!(first.path, run(&d(), &brief, &world).expect("a run").path);
     }
 }

@@ -76,11 +76,11 @@ impl Robot {
         }
         // Inertia first: encoders set the pace of what is said further on.
         if now >= self.inertial_due {
-            self.inertial_due = self.inertial_due + Seconds(1.0 / self.params.rates.inertial_hz);
+            self.inertial_due += Seconds(1.0 / self.params.rates.inertial_hz);
             up.send(now, ToHost::Inertial(self.emulator.inertial()));
         }
         if now >= self.encoders_due {
-            self.encoders_due = self.encoders_due + Seconds(1.0 / self.params.rates.encoders_hz);
+            self.encoders_due += Seconds(1.0 / self.params.rates.encoders_hz);
             up.send(now, ToHost::Encoders(self.emulator.encoders()));
         }
     }

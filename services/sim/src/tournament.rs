@@ -1,6 +1,6 @@
 //! The tournament: every corrector on every course in every scenario, many times, and what follows from it.
 
-use crate::course::Course;
+use crate::course::{Brief, Course};
 use crate::metrics::METRICS;
 use crate::run::{Ending, Run, run};
 use crate::scenario::Scenario;
@@ -72,12 +72,20 @@ impl Tournament {
     /// Plays one run: jobs are numbered from 0, and none depends on another.
     ///
     /// # Errors
-    /// What a planner or the simulation refuses, with the names of course and scenario.
+    /// What a planner or the simulation refuses.
     pub fn play(&self, job: usize) -> Result<Run, Refusal> {
         let place = self.place(job);
-        let seed = self.seed_of(place);
-        let brief = self.courses[place.course].brief(seed)?;
-        run(&self.seats[place.seat], &brief, &self.scenarios[place.scenario].world(seed))
+        let world = self.scenarios[place.scenario].world(self.seed_of(place));
+        run(&self.seats[place.seat], &self.brief(job)?, &world)
+    }
+
+    /// What is driven in a run.
+    ///
+    /// # Errors
+    /// What a planner refuses.
+    pub fn brief(&self, job: usize) -> Result<Brief, Refusal> {
+        let place = self.place(job);
+        self.courses[place.course].brief(self.seed_of(place))
     }
 
     fn place(&self, job: usize) -> Place {
@@ -101,7 +109,7 @@ impl Tournament {
     }
 
     /// What follows from all runs, in the order of the jobs: each course in each scenario, then all courses in each
-    /// scenario, then all in all; the correctors side by side.
+    /// scenario, then all in all, where there are several; the correctors side by side. The last rows are the widest.
     #[must_use]
     pub fn rows(&self, runs: &[Run]) -> Vec<Row> {
         let (courses, scenarios) = (0..self.courses.len(), 0..self.scenarios.len());
@@ -111,10 +119,15 @@ impl Tournament {
                 rows.extend(self.compare(runs, course..course + 1, scenario..scenario + 1));
             }
         }
-        for scenario in scenarios.clone() {
-            rows.extend(self.compare(runs, courses.clone(), scenario..scenario + 1));
+        // Of one course there is nothing to sum up, nor of one scenario.
+        if courses.len() > 1 {
+            for scenario in scenarios.clone() {
+                rows.extend(self.compare(runs, courses.clone(), scenario..scenario + 1));
+            }
         }
-        rows.extend(self.compare(runs, courses, scenarios));
+        if scenarios.len() > 1 {
+            rows.extend(self.compare(runs, courses, scenarios));
+        }
         rows
     }
 
@@ -130,11 +143,8 @@ impl Tournament {
         let runs: Vec<Vec<&Run>> = (0..self.seats.len()).map(of_seat).collect();
         let of_metric = |metric: usize| self.estimates(&runs, metric);
         let estimates: Vec<Vec<Estimate>> = (0..METRICS.len()).map(of_metric).collect();
-        let name = |range: &Range, names: &dyn Fn(usize) -> &'static str, count: usize| {
-            if range.len() == 1 && count > 1 || count == 1 { names(range.start) } else { ALL }
-        };
-        let course = name(&courses, &|course| self.courses[course].name, self.courses.len());
-        let scenario = name(&scenarios, &|scenario| self.scenarios[scenario].name, self.scenarios.len());
+        let course = if courses.len() == 1 { self.courses[courses.start].name } else { ALL };
+        let scenario = if scenarios.len() == 1 { self.scenarios[scenarios.start].name } else { ALL };
         let row = |(seat, runs): (usize, &Vec<&Run>)| Row {
             corrector: self.seats[seat].name,
             course,
