@@ -110,10 +110,13 @@ impl<'a> Host<'a> {
                 // What the gate said before the grant is not about this lease.
                 self.state = None;
                 let begun = granted.and_then(|lease| Ok((lease, self.seat.begin(self.brief, &self.seen)?)));
-                self.stage = match begun {
-                    Ok((lease, corrector)) => Stage::Driving { corrector, lease, seq: 0 },
-                    Err(refusal) => Stage::Over(Err(refusal)),
-                };
+                match begun {
+                    Ok((lease, corrector)) => {
+                        self.stage = Stage::Driving { corrector, lease, seq: 0 };
+                        self.step(now, down);
+                    }
+                    Err(refusal) => self.stage = Stage::Over(Err(refusal)),
+                }
             }
             Stage::Driving { .. } => self.step(now, down),
         }

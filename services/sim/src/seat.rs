@@ -1,7 +1,7 @@
 //! Seats: a corrector of any kind, with its parameters, as one type.
 
 use crate::course::Brief;
-use axle_correctors::DCorrector;
+use axle_correctors::{ArcCorrector, DCorrector, GCorrector, LtvCorrector, PursuitCorrector, WCorrector};
 use axle_schema::contract::{Corrector, Params, Seen, Step};
 use axle_schema::{Drive, Plan, Refusal, Seconds, Task, TaskId};
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use toml::{Table, Value};
 /// A parameter that may be tuned, and between what.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Knob {
-    /// Its name in the parameter file.
+    /// Its name in the parameter file; `table.name` where it is in a table.
     pub field: &'static str,
     /// The least and the largest value that is tried.
     pub range: (f64, f64),
@@ -19,8 +19,24 @@ pub struct Knob {
 /// The correctors of the tournament: each is one line, with the parameters that may be tuned.
 #[must_use]
 pub fn seats() -> Vec<Seat> {
-    vec![Seat::of::<DCorrector>("d-corrector", const { &[knob("pole", 0.3, 0.92), knob("lead", 0.0, 0.2)] })]
+    vec![
+        Seat::of::<DCorrector>("d-corrector", D),
+        Seat::of::<GCorrector>("g-corrector", G),
+        Seat::of::<WCorrector>("w-corrector", W),
+        Seat::of::<ArcCorrector>("arc-corrector", ARC),
+        Seat::of::<PursuitCorrector>("pursuit-corrector", PURSUIT),
+        Seat::of::<LtvCorrector>("ltv-corrector", LTV),
+    ]
 }
+
+const D: &[Knob] = &[knob("pole", 0.3, 0.92), knob("lead", 0.0, 0.2)];
+const G: &[Knob] =
+    &[knob("ratio.proportional", 0.0, 1.0), knob("ratio.integral", 0.5, 15.0), knob("lead", 0.0, 0.2)];
+const W: &[Knob] = &[knob("pull", 1.0, 12.0), knob("turning", 1.0, 10.0), knob("lead", 0.0, 0.2)];
+const ARC: &[Knob] = &[knob("sharpening", 1.0, 9.0), knob("hump", 0.05, 0.6), knob("lead", 0.0, 0.2)];
+const PURSUIT: &[Knob] = &[knob("lookahead", 0.2, 1.5), knob("nearest", 0.05, 0.3), knob("lead", 0.0, 0.2)];
+const LTV: &[Knob] =
+    &[knob("along", 0.01, 0.5), knob("aside", 0.01, 0.5), knob("heading", 0.05, 2.0), knob("lead", 0.0, 0.2)];
 
 const fn knob(field: &'static str, low: f64, high: f64) -> Knob {
     Knob { field, range: (low, high) }
@@ -124,7 +140,10 @@ impl Seat {
     /// The values of its knobs.
     #[must_use]
     pub fn values(&self) -> Vec<f64> {
-        let value = |knob: &Knob| self.params.get(knob.field).and_then(Value::as_float);
+        let value = |knob: &Knob| match knob.field.split_once('.') {
+            Some((table, field)) => self.params.get(table)?.get(field)?.as_float(),
+            None => self.params.get(knob.field)?.as_float(),
+        };
         self.knobs.iter().map(|knob| value(knob).unwrap_or(knob.range.0)).collect()
     }
 }
@@ -132,7 +151,13 @@ impl Seat {
 /// Parameters with other values of some fields.
 fn turned<P: Params>(mut table: Table, knobs: &[Knob], values: &[f64]) -> Result<P, Refusal> {
     for (knob, value) in knobs.iter().zip(values) {
-        table.insert(knob.field.to_owned(), Value::Float(*value));
+        let (place, field) = match knob.field.split_once('.') {
+            Some((inner, field)) => (table.get_mut(inner).and_then(Value::as_table_mut), field),
+            None => (Some(&mut table), knob.field),
+        };
+        if let Some(place) = place {
+            place.insert(field.to_owned(), Value::Float(*value));
+        }
     }
     let params: P = table.try_into().map_err(|fault| Refusal::malformed("tuned parameters", fault))?;
     params.check()?;
@@ -148,7 +173,6 @@ mod tests {
         for seat in seats() {
             let values = seat.values();
             for (knob, value) in seat.knobs.iter().zip(&values) {
-                assert!(seat.params.contains_key(knob.field), "{}: {knob:?}", seat.name);
                 assert!((knob.range.0..=knob.range.1).contains(value), "{}: {knob:?} is {value}", seat.name);
             }
             for end in [|knob: &Knob| knob.range.0, |knob: &Knob| knob.range.1] {
