@@ -1,6 +1,7 @@
 //! Processes come and go: in any order, alone or under `axle up`, and nothing is left behind.
 
 mod demo;
+mod tournament;
 mod up;
 
 use crate::harness::{Process, Robot, SERVICES, World, all_alive, eventually, is_alive};

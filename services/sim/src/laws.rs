@@ -212,7 +212,7 @@ impl Corrector for Probe {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(ProptestConfig::with_cases(12))]
 
     #[test]
     fn the_same_seed_gives_the_same_bits_and_time_never_goes_back(
