@@ -5,12 +5,12 @@ mod lines;
 mod tournament;
 
 pub(crate) use lines::{Chart, Convert};
+pub(crate) use tournament::Tournament;
 
 use crate::settings::Settings;
 use axle_schema::{Pose, Refusal, WayTask};
 use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
-pub(crate) use tournament::Tournament;
 
 /// Services that drive differential-wheeled robots, over Zenoh.
 #[derive(Debug, Parser)]

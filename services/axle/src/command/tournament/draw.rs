@@ -26,8 +26,9 @@ pub(super) fn draw(tournament: &Tournament, runs: &[Run], directory: &Path) -> a
         let of_seats = || cell.chunks(tournament.runs).zip(&tournament.seats).take(MOST);
         let plan = tournament.brief(first)?.plan;
         // The paths are those of the first run of each, which all have had the same accidents.
-        let driven = of_seats().filter_map(|(runs, seat)| {
-            Some(PathSeries { name: seat.name.to_owned(), points: runs.first()?.path.clone() })
+        let driven = of_seats().enumerate().filter_map(|(index, (runs, seat))| {
+            let points = runs.first()?.path.clone();
+            Some(PathSeries { name: seat.name.to_owned(), points, ink: index + 1 })
         });
         let paths: Vec<_> = [PathSeries::planned(path::of_plan(&plan))].into_iter().chain(driven).collect();
         let spreads: Vec<_> = of_seats().map(|(runs, seat)| spread(seat.name, runs.iter())).collect();
