@@ -18,7 +18,19 @@ MESH = "axle-mesh"
 ROUTER = "axle-router"
 SHELL = "axle"
 # Every other crate of the workspace is an algorithm: it may use the words, and these crates beside them.
-ALGORITHMS_MAY_USE = {"axle-emulator": {"axle-gate"}}
+ALGORITHMS_MAY_USE = {
+    "axle-emulator": {"axle-gate"},
+    # The simulator joins the others in virtual time; none of them knows it.
+    "axle-sim": {
+        "axle-correctors",
+        "axle-emulator",
+        "axle-gate",
+        "axle-navigator",
+        "axle-pathdriver",
+        "axle-pathfinder",
+        "axle-source",
+    },
+}
 # Nothing of an algorithm, directly or below, may reach a network, a runtime, a clock or a source of randomness.
 FORBIDDEN_BELOW = {"zenoh", "tokio", "mio", "async-std", "smol", "socket2", "rand", "getrandom", "chrono", "clap"}
 MAY_NAME_ZENOH = {MESH, ROUTER}

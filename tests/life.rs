@@ -2,6 +2,7 @@
 
 mod demo;
 mod topology;
+mod tournament;
 mod up;
 
 use crate::harness::{Process, Robot, SERVICES, World, all_alive, eventually, is_alive};

@@ -4,6 +4,7 @@
 //! out, long series are thinned out to what can be seen, and names are escaped. The plane has the same scale in both
 //! directions, so that a square looks square.
 
+mod boxes;
 mod page;
 mod panel;
 mod paths;
@@ -75,6 +76,34 @@ pub(crate) fn demo_chart(
     wheels: &Wheels,
 ) -> anyhow::Result<String> {
     chart(title, paths, way_points, &[Panel::due_and_real(wheels)])
+}
+
+/// How values of one name are spread.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Spread {
+    /// What the legend calls them.
+    pub(crate) name: String,
+    /// The values, in any order.
+    pub(crate) values: Vec<f64>,
+}
+
+/// The paths of several robots, where there are any, and below them how far from the goal they ended, as box plots. The
+/// first path is that of the plan; the next ones have the inks of the boxes.
+pub(crate) fn contest_chart(
+    title: &str,
+    paths: &[PathSeries],
+    (axis, spreads): (&str, &[Spread]),
+) -> anyhow::Result<String> {
+    let plane = (!paths.is_empty()).then(|| paths::Plane::new(paths, &[]));
+    let above = plane.as_ref().map_or(0, paths::Plane::height);
+    let mut page = Page::new(title, above + boxes::height(spreads.len()));
+    let drawn = page.draw(|sheet| {
+        let (upper, lower) = sheet.split_at(above);
+        plane.as_ref().map_or(Ok(()), |plane| plane.draw(&upper))?;
+        boxes::draw(axis, spreads, &lower)
+    });
+    drawn.context("draw the chart")?;
+    Ok(page.into_svg())
 }
 
 /// The paths, and below them some panels.

@@ -2,8 +2,10 @@
 
 pub(crate) mod drive;
 mod lines;
+mod tournament;
 
 pub(crate) use lines::{Chart, Convert};
+pub(crate) use tournament::Tournament;
 
 use crate::settings::Settings;
 use axle_schema::{Pose, Refusal, WayTask};
@@ -64,6 +66,8 @@ pub(crate) enum Command {
     Convert(Convert),
     /// Draw JSON lines or a recording as SVG: the path, and what the wheels do over time
     Chart(Chart),
+    /// Compare the correctors on emulated robots in virtual time, or tune one
+    Tournament(Tournament),
     /// Print the parameters of a service with their explanations
     Params {
         /// The service

@@ -14,6 +14,7 @@ mod router;
 mod run;
 mod stop;
 mod tap;
+mod tournament;
 pub(crate) mod up;
 
 use crate::cli::{Cli, Command};
@@ -42,6 +43,7 @@ pub(crate) async fn dispatch(cli: Cli) -> anyhow::Result<()> {
         Command::Tap(args) => tap::tap(&settings, &args).await,
         Command::Convert(args) => convert::convert(&args),
         Command::Chart(args) => chart::draw(&args),
+        Command::Tournament(args) => tournament::tournament(&args),
         Command::Params { service } => {
             let entry = catalog::find(&service).ok_or_else(|| unknown_service(&service))?;
             Ok(data(entry.params.trim_end())?)

@@ -24,7 +24,7 @@ fn drives(seed: u64, feedback: f64) -> Pose {
     for beat in 0..1400_u32 {
         let now = Seconds(f64::from(beat) * params.rates.beat.0);
         if beat.is_multiple_of(10) && beat < 1200 {
-            let dwm = movement(now.0, &robot, feedback);
+            let dwm = movement(now.0, &mut robot, feedback);
             let (boot, epoch, echo) = (lease.boot, lease.epoch, Tick::of(now));
             let command = Command { boot, epoch, seq: beat, echo, ttl_ms: 100, dwm };
             gate.obey(now, &command).expect("obeyed");
@@ -38,7 +38,7 @@ fn drives(seed: u64, feedback: f64) -> Pose {
 }
 
 /// The movement of the next 50 ms.
-fn movement(time: f64, robot: &Emulator, feedback: f64) -> Dwm {
+fn movement(time: f64, robot: &mut Emulator, feedback: f64) -> Dwm {
     let (distance, speed) = due(time);
     let (_, next) = due(time + 0.05);
     let correction = robot.encoders().sides().map(|real| MetresPerSecond((distance - real).0 * feedback));

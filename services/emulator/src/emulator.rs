@@ -1,31 +1,31 @@
 //! The body of the emulated robot, and its sensors.
 
 use crate::EmulatorParams;
+use crate::ground::Ground;
+use crate::motors::{Motors, Turned};
 use crate::random::Random;
+use crate::sensors::Sensors;
 use axle_schema::contract::Bounds as _;
 use axle_schema::dwm::MAX_WHEEL_SPEED;
 use axle_schema::{
-    Dwm, EncodersData, InertialData, Metres, MetresPerSecond, NavigatorData, Pose, Radians, RadiansPerSecond,
-    Refusal, Seconds, Sides, Twist,
+    Dwm, EncodersData, InertialData, Metres, MetresPerSecond, NavigatorData, Pose, RadiansPerSecond, Refusal,
+    Seconds, Sides, Twist,
 };
 
 /// A robot in software, which stands at first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Emulator {
     params: EmulatorParams,
-    /// How much faster than asked each wheel drives: the same all its life.
-    gains: Sides<f64>,
-    gyro_bias: RadiansPerSecond,
+    motors: Motors,
+    ground: Ground,
+    sensors: Sensors,
     jitter: Random,
-    gyro_noise: Random,
     now: Seconds,
-    /// The setpoint of the wheels at `now`.
-    asked: Sides<MetresPerSecond>,
     pose: Pose,
-    /// What the wheels have really covered.
+    /// What the rims of the wheels have really covered.
     distances: Sides<Metres>,
-    /// Time and true heading at the latest reading of the gyroscope.
-    gyro_read: (Seconds, Radians),
+    /// How fast the wheels move the robot now, but for the jitter.
+    speeds: Sides<MetresPerSecond>,
 }
 
 impl Emulator {
@@ -38,19 +38,21 @@ impl Emulator {
         let seed = params.seed;
         // Each imperfection has its own stream: how often a sensor is read does not change how the robot drives.
         let mut body = Random::new(seed, 0);
-        let mut gain = || 1.0 + params.motors.gain_deviation * body.normal().clamp(-3.0, 3.0);
-        let gains = Sides { left: gain(), right: gain() };
+        let gains = params
+            .motors
+            .gain
+            .map(|gain| gain + params.motors.gain_deviation * body.normal().clamp(-3.0, 3.0));
+        let gyro_bias = params.gyro.bias + params.gyro.bias_deviation * body.normal();
         Ok(Self {
             params,
-            gains,
-            gyro_bias: params.gyro.bias_deviation * body.normal(),
+            motors: Motors::new(&params, gains),
+            ground: Ground::new(params.slip, seed),
+            sensors: Sensors::new(&params, gyro_bias, params.start),
             jitter: Random::new(seed, 1),
-            gyro_noise: Random::new(seed, 2),
             now: Seconds::ZERO,
-            asked: Sides::default(),
             pose: params.start,
             distances: Sides::default(),
-            gyro_read: (Seconds::ZERO, params.start.heading),
+            speeds: Sides::default(),
         })
     }
 
@@ -60,20 +62,22 @@ impl Emulator {
     /// 20 m/s for that: no wheel does more.
     pub fn advance(&mut self, to: Seconds, speeds: Sides<MetresPerSecond>) {
         let duration = to - self.now;
-        let speeds = speeds.map(possible);
-        let start = self.asked.zip(self.gains, |speed, gain| speed * gain);
-        let end = speeds.zip(self.gains, |speed, gain| speed * gain);
-        let later = duration.is_finite() && duration.0 > 0.0;
-        if !later {
+        // The shortest interval is one in which no speed becomes infinite; the next call covers a shorter one.
+        if !(duration.is_finite() && duration.0 > 1e-9) {
             return;
         }
+        let Turned { start, end, bulge } = self.motors.turn(speeds.map(possible), duration, to);
         let jitter = start.zip(end, |v0, v1| self.jitters((v0 + v1) / 2.0 * duration) / duration);
-        let moved = Dwm::new(start.zip(jitter, |v, e| v + e), end.zip(jitter, |v, e| v + e), duration);
-        // Only an interval that is too short to be one makes a speed infinite; the next call covers it.
-        let Ok(moved) = moved else { return };
+        let extra = jitter.zip(bulge, |jitter, bulge| jitter + bulge);
+        let (start, rim) = (start.zip(extra, |v, e| v + e), end.zip(extra, |v, e| v + e));
+        let covered = start.zip(rim, |v0, v1| (v0 + v1) / 2.0 * duration);
+        let (start, over_ground) = self.ground.holds(start, rim, covered);
+        let Ok(moved) = Dwm::new(start, over_ground, duration) else { return };
         self.pose = moved.pose_at(self.pose, self.params.robot.track, duration);
-        self.distances = self.distances.zip(moved.encoders_span().sides(), |sum, span| sum + span);
-        (self.now, self.asked) = (to, speeds);
+        self.distances = self.distances.zip(covered, |sum, span| sum + span);
+        // The jitter is no speed: it is what chance adds to the distance.
+        self.speeds = over_ground.zip(extra, |v, e| v - e);
+        self.now = to;
     }
 
     /// The distance that a wheel covers too much, by chance, over `distance`.
@@ -87,26 +91,18 @@ impl Emulator {
         self.now
     }
 
-    /// What the encoders count since boot: the last whole tick of each wheel, less than a tick below the truth.
+    /// What the encoders count since boot: the last whole tick of each wheel, less than a tick below the truth, but
+    /// for their noise.
     #[must_use]
-    pub fn encoders(&self) -> EncodersData {
-        let tick = self.params.encoders.tick;
-        let Sides { left, right } = self.distances.map(|distance| tick * (distance / tick).floor());
-        EncodersData { stamp: self.now, left, right }
+    pub fn encoders(&mut self) -> EncodersData {
+        self.sensors.encoders(self.now, self.distances)
     }
 
-    /// What the gyroscope measures: the mean turn rate since its latest reading, with bias and noise. A mean and not
-    /// an instant, since real ones filter, and so that the sum of the readings is the turn.
+    /// What gyroscope and accelerometers measure: the means since their latest reading, with bias and noise.
+    #[must_use]
     pub fn inertial(&mut self) -> InertialData {
-        let (stamp, heading) = self.gyro_read;
-        let rate = if self.now.0 > stamp.0 {
-            (self.pose.heading - heading) / (self.now - stamp)
-        } else {
-            self.twist().omega
-        };
-        self.gyro_read = (self.now, self.pose.heading);
-        let noise = self.params.gyro.noise_deviation * self.gyro_noise.normal();
-        InertialData { stamp: self.now, gyro: rate + self.gyro_bias + noise, ax: None, ay: None }
+        let truth = self.truth();
+        self.sensors.inertial(&truth)
     }
 
     /// Where the robot really is. The speeds leave the jitter out.
@@ -115,8 +111,14 @@ impl Emulator {
         NavigatorData { stamp: self.now, pose: self.pose, twist: Some(self.twist()), covariance: None }
     }
 
+    /// How fast the rims of the wheels run, but for the jitter.
+    #[must_use]
+    pub const fn rim_speeds(&self) -> Sides<MetresPerSecond> {
+        self.motors.rim()
+    }
+
     fn twist(&self) -> Twist {
-        let Sides { left, right } = self.asked.zip(self.gains, |speed, gain| speed * gain);
+        let Sides { left, right } = self.speeds;
         let omega = RadiansPerSecond((right - left).0 / self.params.robot.track.get());
         Twist { v: (left + right) / 2.0, omega }
     }
@@ -134,7 +136,8 @@ const fn possible(speed: MetresPerSecond) -> MetresPerSecond {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{GyroParams, MotorsParams};
+    use crate::{AccelerometersParams, EncodersParams, GyroParams, MotorsParams, SlipParams};
+    use axle_schema::MetresPerSecondSquared;
     use proptest::prelude::*;
 
     fn speeds(left: f64, right: f64) -> Sides<MetresPerSecond> {
@@ -144,10 +147,15 @@ mod tests {
     /// A robot that does as it is told and knows what it does.
     fn perfect() -> Emulator {
         let params = EmulatorParams {
-            motors: MotorsParams { gain_deviation: 0.0, jitter: Metres::ZERO },
+            motors: MotorsParams { gain_deviation: 0.0, jitter: Metres::ZERO, ..MotorsParams::default() },
             gyro: GyroParams {
                 bias_deviation: RadiansPerSecond::ZERO,
                 noise_deviation: RadiansPerSecond::ZERO,
+                ..GyroParams::default()
+            },
+            accelerometers: AccelerometersParams {
+                bias_deviation: MetresPerSecondSquared::ZERO,
+                noise_deviation: MetresPerSecondSquared::ZERO,
             },
             ..EmulatorParams::default()
         };
@@ -163,7 +171,7 @@ mod tests {
         assert!((truth.pose.x.0 - 0.5).abs() < 1e-12 && truth.pose.y.0.abs() < 1e-12, "{truth:?}");
         assert_eq!(truth.twist.map(|twist| twist.v), Some(MetresPerSecond(0.5)));
         // Then the right wheel comes to 1.1 m/s in 1 s: it covers 0.3 m more, with a track of 0.3 m: 1 rad.
-        robot.inertial();
+        let _ = robot.inertial();
         robot.advance(Seconds(3.0), speeds(0.5, 1.1));
         assert!((robot.truth().pose.heading.0 - 1.0).abs() < 1e-12);
         assert!((robot.inertial().gyro.0 - 1.0).abs() < 1e-12, "the mean turn rate");
@@ -191,7 +199,8 @@ mod tests {
         for beat in 1..1000 {
             robot.advance(Seconds(f64::from(beat) * 0.005), Sides::default());
         }
-        assert_eq!((robot.truth().pose, robot.encoders().left), (Pose::default(), Metres::ZERO));
+        let counted = robot.encoders().left;
+        assert_eq!((robot.truth().pose, counted), (Pose::default(), Metres::ZERO));
         assert_ne!(robot.inertial().gyro, RadiansPerSecond::ZERO, "but its gyroscope says otherwise");
     }
 
@@ -204,9 +213,60 @@ mod tests {
             for robot in [&mut read, &mut unread] {
                 robot.advance(Seconds(f64::from(beat) * 0.005), speeds(0.3, 0.4));
             }
-            read.inertial();
+            let _ = read.inertial();
         }
         assert_eq!(read.truth(), unread.truth());
+    }
+
+    #[test]
+    fn accelerometers_feel_the_start_and_the_bend() {
+        let mut robot = perfect();
+        robot.advance(Seconds(1.0), speeds(0.5, 0.5));
+        let felt = robot.inertial();
+        let [ax, ay] = [felt.ax, felt.ay].map(|a| a.expect("it is measured").0);
+        assert!((ax - 0.5).abs() < 1e-12 && ay.abs() < 1e-12, "0.5 m/s in 1 s: {ax}, {ay}");
+        robot.advance(Seconds(1.001), speeds(0.35, 0.65));
+        let _ = robot.inertial();
+        robot.advance(Seconds(2.001), speeds(0.35, 0.65));
+        let felt = robot.inertial();
+        let [ax, ay] = [felt.ax, felt.ay].map(|a| a.expect("it is measured").0);
+        assert!(ax.abs() < 1e-12 && (ay - 0.5).abs() < 1e-12, "0.5 m/s at 1 rad/s to the left: {ax}, {ay}");
+    }
+
+    #[test]
+    fn a_slip_moves_the_robot_less_than_its_encoders_say() {
+        let slip = SlipParams { rate: 1.0, ..SlipParams::default() };
+        let mut robot = Emulator::new(EmulatorParams { slip, ..perfect().params }).expect("a robot");
+        for beat in 1..=5000_u32 {
+            robot.advance(Seconds(f64::from(beat) * 0.001), speeds(0.5, 0.5));
+        }
+        let counted = robot.encoders();
+        assert!((counted.left.0 - 2.4998).abs() < 0.001, "{counted:?}");
+        let pose = robot.truth().pose;
+        assert!(pose.x.0 < 2.49 && pose.heading.0.abs() > 1e-3, "{pose:?}");
+    }
+
+    #[test]
+    fn noisy_encoders_and_a_drifting_gyroscope_leave_the_truth_alone() {
+        let encoders = EncodersParams { noise: Metres(0.01), ..EncodersParams::default() };
+        let gyro = GyroParams { drift: RadiansPerSecond(0.1), ..perfect().params.gyro };
+        let mut noisy =
+            Emulator::new(EmulatorParams { encoders, gyro, ..perfect().params }).expect("a robot");
+        let mut quiet = perfect();
+        let (mut spread, mut rate) = (0.0, 0.0);
+        for beat in 1..=1000_u32 {
+            for robot in [&mut noisy, &mut quiet] {
+                robot.advance(Seconds(f64::from(beat) * 0.01), Sides::default());
+            }
+            spread += noisy.encoders().left.0.powi(2) / 1000.0;
+            rate = noisy.inertial().gyro.0;
+        }
+        assert!((0.008..0.012).contains(&spread.sqrt()), "{spread}");
+        assert!(
+            rate.abs() > 0.01 && rate.abs() < 1.5,
+            "after 10 s it has drifted by about 0.3 rad/s: {rate}"
+        );
+        assert_eq!(noisy.truth(), quiet.truth());
     }
 
     /// Setpoints at growing times.

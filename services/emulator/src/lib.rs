@@ -5,21 +5,29 @@
 //! *Paper*: part II, where correctors are tried on a simulated robot before a real one.
 //! *When it fails*: as a real robot does: its sensors fall silent, and everybody brakes.
 //!
-//! What it shows honestly: wheels that drive a constant share faster or slower than asked and jitter a little,
-//! encoders that count whole ticks, a gyroscope with bias and noise. So a movement driven blindly misses its goal, and
-//! one corrected by encoders reaches it. What it does not show: motors with lag and dead band, wheels that slip or
-//! differ in size, so encoders tell the truth up to a tick.
+//! What it shows honestly: wheels that drive a constant share faster or slower than asked and jitter a little, motors
+//! with friction, lag and a largest speed, a battery that tires, wheels that slip, encoders that count whole ticks, a
+//! gyroscope and accelerometers with bias, noise and drift. So a movement driven blindly misses its goal, and one
+//! corrected by encoders reaches it, unless the wheels slip. Much of this is switched off in the shipped parameters,
+//! and each has its unit and range there. What it does not show: walls, and boards that speak over a serial line.
 //!
 //! It is a value in virtual time: it moves when told to, and the same seed and calls give the same bits.
 
 mod emulator;
+mod ground;
 mod motor;
+mod motors;
 mod params;
 mod random;
+mod sensors;
 
 #[cfg(test)]
 mod courses;
 
 pub use emulator::Emulator;
 pub use motor::{Motor, MotorParams, RIGHT_MOTOR};
-pub use params::{EmulatorParams, EncodersParams, GyroParams, MotorsParams, Rates};
+pub use params::{
+    AccelerometersParams, BatteryParams, EmulatorParams, EncodersParams, GyroParams, MotorsParams, Rates,
+    SlipParams,
+};
+pub use random::Random;

@@ -3,8 +3,13 @@
 use axle_gate::GateParams;
 use axle_schema::contract::{Bounds, Params};
 use axle_schema::refusal::within;
-use axle_schema::{Drivetrain, Metres, Pose, RadiansPerSecond, Refusal, Seconds};
+use axle_schema::{Drivetrain, Pose, Refusal, Seconds};
 use serde::{Deserialize, Serialize};
+
+mod body;
+mod senses;
+pub use body::{BatteryParams, MotorsParams, SlipParams};
+pub use senses::{AccelerometersParams, EncodersParams, GyroParams};
 
 /// Parameters of the emulator and of the gate before it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -22,10 +27,16 @@ pub struct EmulatorParams {
     pub start: Pose,
     /// How badly its motors obey.
     pub motors: MotorsParams,
+    /// What its battery gives.
+    pub battery: BatteryParams,
+    /// How its wheels slip.
+    pub slip: SlipParams,
     /// How finely its encoders count.
     pub encoders: EncodersParams,
     /// How well its gyroscope measures.
     pub gyro: GyroParams,
+    /// How well its accelerometers measure.
+    pub accelerometers: AccelerometersParams,
 }
 
 /// How often the emulated robot moves and speaks.
@@ -42,36 +53,6 @@ pub struct Rates {
     pub truth_hz: f64,
 }
 
-/// How badly the motors obey.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct MotorsParams {
-    /// Standard deviation of the constant gain of each wheel around 1, 0 to 0.1. The gains are drawn once, from the
-    /// seed, within three deviations.
-    pub gain_deviation: f64,
-    /// Standard deviation of the distance of a wheel after 1 m, in m, 0 to 0.05. It grows with the square root of
-    /// the distance, so that the length of the beats does not matter, and a wheel at rest rests.
-    pub jitter: Metres,
-}
-
-/// How finely the encoders count.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct EncodersParams {
-    /// Distance of the rim of a wheel from tick to tick, 1e-6 to 0.1 m.
-    pub tick: Metres,
-}
-
-/// How well the gyroscope measures.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct GyroParams {
-    /// Standard deviation of the constant bias, 0 to 0.5 rad/s. The bias is drawn once, from the seed.
-    pub bias_deviation: RadiansPerSecond,
-    /// Standard deviation of the white noise of a reading, 0 to 0.5 rad/s.
-    pub noise_deviation: RadiansPerSecond,
-}
-
 impl Default for EmulatorParams {
     fn default() -> Self {
         Self {
@@ -82,8 +63,11 @@ impl Default for EmulatorParams {
             rates: Rates::default(),
             start: Pose::default(),
             motors: MotorsParams::default(),
+            battery: BatteryParams::default(),
+            slip: SlipParams::default(),
             encoders: EncodersParams::default(),
             gyro: GyroParams::default(),
+            accelerometers: AccelerometersParams::default(),
         }
     }
 }
@@ -92,23 +76,6 @@ impl Default for Rates {
         Self { beat: Seconds(0.005), encoders_hz: 50.0, inertial_hz: 50.0, truth_hz: 20.0 }
     }
 }
-impl Default for MotorsParams {
-    fn default() -> Self {
-        Self { gain_deviation: 0.01, jitter: Metres(0.001) }
-    }
-}
-impl Default for EncodersParams {
-    /// A wheel of 64 mm with 400 ticks in a turn.
-    fn default() -> Self {
-        Self { tick: Metres(0.0005) }
-    }
-}
-impl Default for GyroParams {
-    fn default() -> Self {
-        Self { bias_deviation: RadiansPerSecond(0.005), noise_deviation: RadiansPerSecond(0.005) }
-    }
-}
-
 impl Bounds for EmulatorParams {
     fn check(&self) -> Result<(), Refusal> {
         self.robot.check()?;
@@ -120,11 +87,12 @@ impl Bounds for EmulatorParams {
         within("start.x in m", self.start.x.0, -1e4, 1e4)?;
         within("start.y in m", self.start.y.0, -1e4, 1e4)?;
         within("start.heading in rad", self.start.heading.0, -1e3, 1e3)?;
-        within("motors.gain_deviation", self.motors.gain_deviation, 0.0, 0.1)?;
-        within("motors.jitter in m", self.motors.jitter.0, 0.0, 0.05)?;
-        within("encoders.tick in m", self.encoders.tick.0, 1e-6, 0.1)?;
-        within("gyro.bias_deviation in rad/s", self.gyro.bias_deviation.0, 0.0, 0.5)?;
-        within("gyro.noise_deviation in rad/s", self.gyro.noise_deviation.0, 0.0, 0.5)
+        self.motors.check()?;
+        self.battery.check()?;
+        self.slip.check()?;
+        self.encoders.check()?;
+        self.gyro.check()?;
+        self.accelerometers.check()
     }
 }
 
@@ -157,6 +125,12 @@ mod tests {
             "[rates]\nbeat = 0.1",
             "[encoders]\ntick = 0",
             "[motors]\ngain_deviation = 0.5",
+            "[motors]\ngain = { left = 0.0, right = 1.0 }",
+            "[motors]\nlag = -0.1",
+            "[battery]\nsag = 1.0",
+            "[slip]\nshare = 1.5",
+            "[gyro]\nbias = 1.0",
+            "[accelerometers]\nnoise_deviation = -1",
             "[gate]\na_max = 1",
         ] {
             let params: EmulatorParams = toml::from_str(text).expect("parameters");

@@ -5,17 +5,19 @@ use std::f64::consts::TAU;
 /// SplitMix64 (Steele, Lea, Flood 2014): the state goes through all 64-bit numbers in steps of a constant, and each
 /// is mixed into an output. Small, fast and good enough for noise; not for secrets.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Random(u64);
+pub struct Random(u64);
 
 impl Random {
     /// The sequence number `stream` of a seed; the streams of one seed have nothing to do with each other.
-    pub(crate) fn new(seed: u64, stream: u64) -> Self {
+    #[must_use]
+    pub fn new(seed: u64, stream: u64) -> Self {
         let mut random = Self(seed);
         let start = random.bits();
         Self(start ^ stream.wrapping_mul(0xD1B5_4A32_D192_ED03))
     }
 
-    fn bits(&mut self) -> u64 {
+    /// 64 bits.
+    pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut mixed = self.0;
         mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -24,14 +26,19 @@ impl Random {
     }
 
     /// A uniform number in (0, 1]: never 0, of which there is no logarithm.
-    fn uniform(&mut self) -> f64 {
+    pub fn uniform(&mut self) -> f64 {
         #[allow(clippy::cast_precision_loss, reason = "53 bits fit a float exactly")]
         let bits = ((self.bits() >> 11) + 1) as f64;
         bits / (1_u64 << 53) as f64
     }
 
+    /// A waiting time without memory, of mean 1.
+    pub fn waiting(&mut self) -> f64 {
+        -self.uniform().ln()
+    }
+
     /// A normal number of mean 0 and standard deviation 1 (Box and Muller 1958).
-    pub(crate) fn normal(&mut self) -> f64 {
+    pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * self.uniform().ln()).sqrt();
         radius * (TAU * self.uniform()).cos()
     }

@@ -14,7 +14,7 @@ const UNITS: u32 = 4;
 const TITLE: u32 = 46;
 const WIDTH: u32 = 900;
 /// Room for the numbers and the name of the vertical axis.
-const LEFT: u32 = 74;
+pub(super) const LEFT: u32 = 74;
 /// Room for the numbers and the name of the horizontal axis.
 pub(super) const BOTTOM: u32 = 46;
 /// Room for the legend, beside the plot: it never covers data.
@@ -31,7 +31,7 @@ pub(super) const PURPLE: RGBColor = RGBColor(204, 121, 167);
 pub(super) const ORANGE: RGBColor = RGBColor(230, 159, 0);
 pub(super) const SKY: RGBColor = RGBColor(86, 180, 233);
 pub(super) const INK: RGBColor = RGBColor(40, 40, 40);
-const GRID: RGBColor = RGBColor(226, 226, 226);
+pub(super) const GRID: RGBColor = RGBColor(226, 226, 226);
 const FAINT: RGBColor = RGBColor(120, 120, 120);
 
 /// Pixels in the units of the drawing.
@@ -67,7 +67,7 @@ pub(super) fn clean(name: &str, most: usize) -> String {
 }
 
 /// Numbers of an axis, without useless zeros.
-fn number(value: &f64) -> String {
+pub(super) fn number(value: &f64) -> String {
     let text = format!("{value:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".to_owned() } else { text.to_owned() }

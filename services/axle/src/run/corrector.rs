@@ -243,6 +243,8 @@ impl<C: Driven> Post<C> {
                 // What the gate said before the grant is not about this lease.
                 self.senses.state = None;
                 self.stage = Stage::Driving { task: id, corrector: Box::new(corrector), lease, seq: 0 };
+                // At this very beat: over a slow link the silence since the grant may leave no time for another one.
+                self.step();
             }
             Err(refusal) => self.say_end(id, Phase::Failed(refusal), Account::default()),
         }
