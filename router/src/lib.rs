@@ -102,9 +102,10 @@ impl Router {
             ("mode", "\"router\"".to_owned()),
             ("listen/endpoints", list(&settings.listen)),
             ("connect/endpoints", list(&settings.connect)),
+            // A link that is healed shall be found at once; a try costs a packet.
             (
                 "connect/retry",
-                "{ period_init_ms: 100, period_max_ms: 1000, period_increase_factor: 2 }".to_owned(),
+                "{ period_init_ms: 50, period_max_ms: 200, period_increase_factor: 2 }".to_owned(),
             ),
             // Nobody is looked for by scouting, so nothing has to be waited for.
             ("scouting/delay", "0".to_owned()),
