@@ -1,6 +1,7 @@
 //! Processes come and go: in any order, alone or under `axle up`, and nothing is left behind.
 
 mod demo;
+mod doctor;
 mod topology;
 mod tournament;
 mod up;

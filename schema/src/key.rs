@@ -464,6 +464,16 @@ impl Presence {
     pub fn every_status() -> String {
         format!("{ROOT}/*/@status/**")
     }
+    /// The tokens of one service.
+    #[must_use]
+    pub fn tokens_of(robot: &str, service: &str) -> String {
+        format!("{ROOT}/{robot}/@alive/{service}/**")
+    }
+    /// The statuses of one service.
+    #[must_use]
+    pub fn statuses_of(robot: &str, service: &str) -> String {
+        format!("{ROOT}/{robot}/@status/{service}/*")
+    }
     /// Reads the key of a token; `None` for keys of another shape.
     #[must_use]
     pub fn read(token: &str) -> Option<Self> {
@@ -479,8 +489,9 @@ impl Presence {
     }
 }
 
-/// A host name made fit for a chunk of a key.
-fn chunk(name: &str) -> String {
+/// A host name made fit for a chunk of a key: how [`Presence::read`] gives it back.
+#[must_use]
+pub fn chunk(name: &str) -> String {
     let mut chunk: String = name
         .chars()
         .take(64)

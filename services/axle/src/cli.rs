@@ -38,6 +38,8 @@ pub(crate) enum Command {
     Router(Router),
     /// List the live services
     Ps(Json),
+    /// Find out whether a service works, by a round trip of data through its router
+    Doctor(Doctor),
     /// List the streams with type, rate and size
     Ls(Ls),
     /// Ask Pathfinder for the geometries of a way, and Pathdriver for the movements
@@ -178,6 +180,7 @@ pub(crate) struct Up {
 #[derive(Debug, clap::Args)]
 pub(crate) struct Run {
     /// The service; `axle run help` lists them
+    #[arg(env = "AXLE_SERVICE", hide_env_values = true)]
     pub(crate) service: String,
     /// Hear a stream from elsewhere; may be given several times
     #[arg(long, value_name = "STREAM=OTHER")]
@@ -205,6 +208,20 @@ pub(crate) struct Router {
     /// Listen beyond this computer although nothing is encrypted or authenticated
     #[arg(long)]
     pub(crate) insecure_lan: bool,
+}
+
+/// `axle doctor`.
+#[derive(Clone, Debug, clap::Args)]
+pub(crate) struct Doctor {
+    /// Look at one process: the service or router of this computer that is named, the healthcheck of a container
+    #[arg(long = "self", required = true)]
+    pub(crate) own: bool,
+    /// The service, or `router`
+    #[arg(env = "AXLE_SERVICE", hide_env_values = true)]
+    pub(crate) service: String,
+    /// Print one JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// Arguments of `axle ls`.

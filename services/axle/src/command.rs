@@ -4,6 +4,7 @@ mod chart;
 mod check;
 mod convert;
 mod docs;
+mod doctor;
 mod drive;
 pub(crate) mod go;
 mod graph;
@@ -31,6 +32,7 @@ pub(crate) async fn dispatch(cli: Cli) -> anyhow::Result<()> {
         Command::Run(args) => run::run(&settings, args).await,
         Command::Router(args) => router::router(args).await,
         Command::Ps(args) => ps::ps(&settings, args.json).await,
+        Command::Doctor(args) => doctor::doctor(&settings, &args).await,
         Command::Ls(args) => ls::ls(&settings, &args).await,
         Command::Plan(args) => plan::plan(&settings, args).await,
         Command::Go(args) => go::go(&settings, args).await,

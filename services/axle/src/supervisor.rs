@@ -268,6 +268,7 @@ fn spawn(job: &Job, program: &Path) -> std::io::Result<Child> {
         .args(&job.args)
         .env(PARENT, "stdin")
         .env_remove("AXLE_ROBOT")
+        .env_remove("AXLE_SERVICE")
         .env_remove("AXLE_PARAMS")
         .env_remove("AXLE_LISTEN")
         .stdin(Stdio::piped())

@@ -92,29 +92,50 @@ impl Mesh {
     /// # Errors
     /// [`Fault::Ask`].
     pub async fn everybody(&self, patience: Duration) -> Result<Vec<(Presence, Option<Status>)>, Fault> {
+        self.look(Presence::every_token(), Presence::every_status(), patience).await
+    }
+
+    /// The same for the processes of one service; `robot` is `all` for planners.
+    ///
+    /// # Errors
+    /// [`Fault::Ask`].
+    pub async fn processes_of(
+        &self,
+        robot: &str,
+        service: &str,
+        patience: Duration,
+    ) -> Result<Vec<(Presence, Option<Status>)>, Fault> {
+        let (tokens, statuses) = (Presence::tokens_of(robot, service), Presence::statuses_of(robot, service));
+        self.look(tokens, statuses, patience).await
+    }
+
+    async fn look(
+        &self,
+        wanted_tokens: String,
+        wanted_statuses: String,
+        patience: Duration,
+    ) -> Result<Vec<(Presence, Option<Status>)>, Fault> {
         let fault = |key: &str| {
             let key = key.to_owned();
             move |source| Fault::Ask { key, source }
         };
         let (sender, mut tokens) = mpsc::channel(MAX_PROCESSES);
-        let every_token = Presence::every_token();
         self.session
             .liveliness()
-            .get(every_token.clone())
+            .get(wanted_tokens.clone())
             .timeout(patience)
             .callback(move |reply| drop(sender.try_send(reply)))
             .wait()
-            .map_err(fault(&every_token))?;
+            .map_err(fault(&wanted_tokens))?;
         let (sender, mut statuses) = mpsc::channel(MAX_PROCESSES);
-        let every_status = Presence::every_status();
         self.session
-            .get(every_status.clone())
+            .get(wanted_statuses.clone())
             .target(QueryTarget::All)
             .consolidation(ConsolidationMode::None)
             .timeout(patience)
             .callback(move |reply| drop(sender.try_send(reply)))
             .wait()
-            .map_err(fault(&every_status))?;
+            .map_err(fault(&wanted_statuses))?;
         let mut known = BTreeMap::new();
         while let Some(reply) = tokens.recv().await {
             if let Ok(sample) = reply.result()

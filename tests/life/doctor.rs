@@ -1,0 +1,26 @@
+//! `axle doctor --self`: what the healthcheck of a container finds.
+
+use crate::harness::{World, all_alive};
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_doctor_finds_healthy_what_answers_and_says_why_something_is_not() {
+    let world = World::new().await;
+    let doctor = async |service: &str| world.done(&["doctor", "--self", service, "--host", "lab"]).await;
+    doctor("pathfinder").await.is(1, &["no router answers"]);
+    let _router = world.router();
+    let mesh = world.join().await;
+    let (_pathfinder, pilot) = (world.run("pathfinder"), world.run("pilot"));
+    all_alive(&mesh, &["pathfinder", "pilot"]).await;
+    for (service, words) in
+        [("router", "between two sessions"), ("pathfinder", "of its trade"), ("pilot", "its beat goes on")]
+    {
+        let ended = doctor(service).await;
+        let said = &ended.is(0, &[]).out;
+        assert!(said.contains(&format!("{service} is healthy")) && said.contains(words), "{said}");
+    }
+    doctor("navigator").await.is(1, &["no navigator for r1 on lab is on the mesh"]);
+    doctor("parrot").await.is(2, &["unknown service", "pathfinder"]);
+    // Its token goes a second later, and with it the knowledge that it is there at all.
+    pilot.freeze().await;
+    doctor("pilot").await.is(1, &["pilot for r1 on lab", "hangs"]);
+}
