@@ -36,6 +36,8 @@ pub(super) struct Node {
     looked: bool,
     /// Whether its pose in `map` was set, so that what came before tells nothing of it.
     placed: bool,
+    /// What a slip adds to the variance of each wheel's distance, in m².
+    slip: f64,
 }
 
 /// A measurement against the map.
@@ -122,6 +124,7 @@ impl Timeline {
             rates: None,
             looked: true,
             placed: false,
+            slip: 0.0,
         });
         let stamp = datum.stamp.0;
         if let (Some(node), true) = (self.nodes.back_mut(), self.young) {
@@ -162,6 +165,7 @@ impl Timeline {
             rates: None,
             looked: false,
             placed: false,
+            slip: 0.0,
         };
         self.nodes.insert(at, node);
         self.replay(at, true, watch);
@@ -223,18 +227,16 @@ impl Timeline {
     /// Reckons the nodes from `first` on again; `odom` only where the motion itself may be another.
     fn replay(&mut self, first: usize, moved: bool, watch: &mut Watch) {
         for index in first.max(1)..self.nodes.len() {
-            let (motion, raw) = self.motion(index, watch);
+            let (mut motion, raw) = self.motion(index, watch);
             let (odom, map) = (self.nodes[index - 1].odom.clone(), self.nodes[index - 1].map.clone());
             let from = self.nodes[index - 1].reading.stamp.0;
             let node = &mut self.nodes[index];
             if moved {
                 node.odom = odom;
                 let bias = node.odom.x[3];
+                let innovation = doubted(&Motion { extra: 0.0, ..motion }, &node.odom, &self.noise);
                 let believed = sift(&motion, &node.odom, &self.noise, watch.gyro_is_proved());
-                let innovation = node
-                    .odom
-                    .predict(&believed, &self.noise)
-                    .or_else(|| doubted(&motion, &node.odom, &self.noise));
+                let _ = node.odom.predict(&believed, &self.noise);
                 let gyro = motion.gyro.map(|angle| angle - bias * motion.dt);
                 let track = self.noise.track * (1.0 + node.odom.x[6]);
                 let by_wheels = (motion.right - motion.left) / track;
@@ -254,6 +256,8 @@ impl Timeline {
                         innovation,
                     };
                     self.noticed.extend(watch.look(&seen, raw, SLIP));
+                    node.slip = watch.slip_variance(track);
+                    motion.extra += node.slip;
                 }
             }
             if node.placed {
@@ -280,7 +284,7 @@ impl Timeline {
             left,
             right,
             gyro: possible,
-            extra: if node.anchor { reach * reach } else { 0.0 },
+            extra: node.slip + if node.anchor { reach * reach } else { 0.0 },
             unseen: if dt > GAP { way * way / 4.0 } else { 0.0 },
         };
         (motion, raw.filter(|_| !node.anchor))

@@ -3,11 +3,14 @@
 use super::filter::Innovation;
 use crate::event::{Event, Sensor, Side};
 use axle_schema::{Metres, Radians, Seconds};
+use std::collections::VecDeque;
 
 /// A gyro has proved its unit when the wheels turned so far, in rad.
 const PROVED: f64 = 0.3;
-/// So many spans in a row disagree before it is said.
-const SPANS: u32 = 3;
+/// For so long, in s, the differences of wheels and gyro are summed: noise cancels, and a slip does not.
+const WHILE: f64 = 0.4;
+/// The most spans of that time.
+const MOST: usize = 64;
 /// The other wheel has covered this, in m, before an encoder counts as stuck.
 const STUCK: f64 = 0.05;
 
@@ -30,7 +33,9 @@ pub(super) struct Watch {
     products: [f64; 2],
     turned: f64,
     scale: Option<f64>,
-    slipping: u32,
+    /// Stamps and innovations of the last spans.
+    last: VecDeque<(f64, Innovation)>,
+    slipping: bool,
     /// Since one encoder stays: which, what the other covered, and both turns.
     stuck: Option<(Side, f64, f64, f64)>,
     stuck_said: bool,
@@ -66,7 +71,8 @@ impl Watch {
     /// A clock that begins anew.
     pub(super) fn restart(&mut self) {
         self.heard = [None; 2];
-        (self.slipping, self.stuck) = (0, None);
+        self.last.clear();
+        (self.slipping, self.stuck) = (false, None);
     }
 
     /// Looks at a span for the first time.
@@ -96,19 +102,35 @@ impl Watch {
     }
 
     fn slip(&mut self, seen: &Seen, encoders: f64, gate: f64) -> Option<Event> {
-        let (Some(Innovation { nu, s }), Some(gyro)) = (seen.innovation, seen.gyro) else { return None };
-        let squared = nu * nu / s;
-        if !(self.gyro_is_proved() && squared > gate) {
-            self.slipping = 0;
-            return None;
+        let (Some(innovation), Some(gyro)) = (seen.innovation, seen.gyro) else { return None };
+        while self.last.len() >= MOST || self.last.front().is_some_and(|first| first.0 < seen.stamp - WHILE) {
+            let _ = self.last.pop_front();
         }
-        self.slipping += 1;
-        (self.slipping == SPANS).then_some(Event::Slip {
+        self.last.push_back((seen.stamp, innovation));
+        let nu: f64 = self.last.iter().map(|(_, innovation)| innovation.nu).sum();
+        let s: f64 = self.last.iter().map(|(_, innovation)| innovation.s).sum();
+        let squared = nu * nu / s;
+        let slips = self.gyro_is_proved() && squared > gate;
+        let begins = slips && !self.slipping;
+        self.slipping = slips;
+        begins.then_some(Event::Slip {
             stamp: Seconds(seen.stamp),
             encoders: Radians(encoders),
             gyro: Radians(gyro),
             squared,
         })
+    }
+
+    /// What a slip that lasts adds to the variance of a wheel's distance in each span, in m². Its error has one sign, so
+    /// that it counts as often as there are spans of it.
+    pub(super) fn slip_variance(&self, track: f64) -> f64 {
+        if !self.slipping {
+            return 0.0;
+        }
+        let nu: f64 = self.last.iter().map(|(_, innovation)| innovation.nu).sum();
+        #[allow(clippy::cast_precision_loss, reason = "at most 64")]
+        let n = self.last.len() as f64;
+        (nu * track).powi(2) / (2.0 * n)
     }
 
     #[allow(clippy::float_cmp, reason = "a stuck encoder repeats the very same reading")]
