@@ -63,6 +63,17 @@ impl Panel {
         Self { axis, lines }
     }
 
+    /// Anything over time: lines with their names and inks; one without a name looks like another one.
+    pub(crate) fn of_lines(axis: &'static str, lines: Vec<(&'static str, usize, Vec<(f64, f64)>)>) -> Self {
+        let lines = lines.into_iter().map(|(name, index, points)| Line {
+            name,
+            style: line(ink(index).into(), 16),
+            is_right: false,
+            points,
+        });
+        Self { axis, lines: lines.collect() }
+    }
+
     pub(super) fn draw(&self, sheet: &Sheet<'_>) -> anyhow::Result<()> {
         let all = self.lines.iter().flat_map(|line| line.points.iter().copied());
         let found = bounds(all);

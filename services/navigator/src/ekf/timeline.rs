@@ -41,7 +41,7 @@ pub(super) struct Node {
 }
 
 /// A measurement against the map.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum What {
     Fix { z: [f64; 2], r: Numbers<4>, heading: Option<(f64, f64)> },
     Range { point: [f64; 2], distance: f64, variance: f64 },
@@ -192,6 +192,11 @@ impl Timeline {
         let stamp = absolute.stamp;
         let first = self.nodes.front().map(|node| node.reading.stamp.0);
         if first.is_some_and(|first| stamp < first && !(self.young && stamp >= first - self.window)) {
+            return false;
+        }
+        // Source repeats what is recent: the same measurement counts once.
+        #[allow(clippy::float_cmp, reason = "a repetition has the very same numbers")]
+        if self.absolutes.iter().any(|other| other.stamp == stamp && other.what == absolute.what) {
             return false;
         }
         if self.absolutes.len() == MOST {
