@@ -60,13 +60,19 @@ fn dead_reckoning_is_as_good_as_it_gets_there() {
 
 #[test]
 fn ranges_do_not_spoil_it() {
-    let ekf = EkfParams {
-        start_sd: Metres(0.01),
-        start_heading_sd: Radians(0.05),
-        range_bias: Metres(0.10),
-        ..EkfParams::default()
-    };
-    let (rms, worst) = errors(params(Method::Ekf, 3.0, ekf));
-    println!("ekf with ranges: {rms:.4} m, at most {worst:.4} m");
-    assert!(rms <= 0.070 && worst <= 0.181, "{rms} m, at most {worst} m; others reach 0.070 m and 0.181 m");
+    // The baseline is 0.070 m and 0.181 m, with a gate of 9 for a range. The gate of a fix is 13.8 where that of a range
+    // is 10.8, so 11.5 is the same gate here, and 9 a tighter one of 7: ultra-wideband has a long tail. That one was
+    // chosen by looking at this very log; the others were not, and miss the baseline by a few percent.
+    for (gate, allowed) in [(9.0, 0.070), (11.5, 0.0715), (13.8, 0.0725)] {
+        let ekf = EkfParams {
+            start_sd: Metres(0.01),
+            start_heading_sd: Radians(0.05),
+            range_bias: Metres(0.10),
+            gate,
+            ..EkfParams::default()
+        };
+        let (rms, worst) = errors(params(Method::Ekf, 3.0, ekf));
+        println!("ekf with ranges, gate {gate}: {rms:.4} m, at most {worst:.4} m");
+        assert!(rms <= allowed && worst <= 0.181, "gate {gate}: {rms} m, at most {worst} m");
+    }
 }

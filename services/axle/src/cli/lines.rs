@@ -61,7 +61,7 @@ pub(crate) struct Chart {
 pub(crate) struct Estimate {
     /// JSON lines of measurements, or an MCAP recording; - is stdin
     #[arg(value_name = "LOG")]
-    pub(crate) log: String,
+    pub(crate) file: String,
     /// arc, point-and-shoot, half-turn, accelerated, ticks or ekf [default: that of the parameters]
     #[arg(long, value_name = "NAME", conflicts_with = "compare")]
     pub(crate) method: Option<String>,

@@ -33,11 +33,11 @@ pub(super) fn estimate(args: &Estimate) -> anyhow::Result<()> {
             usage(format!("unknown method {name:?}; known: {}", Method::ALL.map(Method::name).join(", ")))
         })?;
     }
-    let log = Log::open(&args.log, &mut params)?;
+    let log = Log::open(&args.file, &mut params)?;
     anyhow::ensure!(
         log.items.iter().any(|item| matches!(item, Item::Measured(_))),
         "{} holds no measurement; a line is such as {{\"stamp\":0.1,\"encoders\":{{\"left\":0.05,\"right\":0.05}}}}",
-        args.log
+        args.file
     );
     let methods = if args.compare { Method::ALL.to_vec() } else { vec![params.method] };
     let runs = methods
@@ -45,7 +45,7 @@ pub(super) fn estimate(args: &Estimate) -> anyhow::Result<()> {
         .map(|method| run(&log, NavigatorParams { method, ..params.clone() }))
         .collect::<anyhow::Result<Vec<_>>>()?;
     if let Some(file) = &args.svg {
-        std::fs::write(file, svg(&args.log, &log, &runs)?)
+        std::fs::write(file, svg(&args.file, &log, &runs)?)
             .with_context(|| format!("write {}", file.display()))?;
         note(&format!("drawn: {}", file.display()));
     }

@@ -345,6 +345,9 @@ impl Timeline {
             return true;
         }
         let at = self.nodes.partition_point(|node| node.reading.stamp.0 < stamp);
+        if !self.young && stamp < self.nodes[0].reading.stamp.0 {
+            return false;
+        }
         let Some(odom) = self.odom_at(stamp).filter(|_| stamp <= self.newest_stamp() + GAP) else {
             return false;
         };
