@@ -1,5 +1,19 @@
 //! The three integrators of the literature, as methods of the navigator, against the golden poses.
 
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test ends at what is not as it should be, and says what it measured"
+)]
+#![allow(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::float_cmp,
+    reason = "small numbers, and the very same bits"
+)]
+
 use axle_navigator::{Method, Navigator, NavigatorParams};
 use axle_schema::{Drivetrain, EncodersData, Metres, MetresPerSecond, Pose, Seconds, Track};
 use serde_json::Value;

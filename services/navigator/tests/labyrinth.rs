@@ -1,5 +1,19 @@
 //! A real robot: the labyrinth log, which tests/data/README.md describes, against what others reach on it.
 
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test ends at what is not as it should be, and says what it measured"
+)]
+#![allow(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::float_cmp,
+    reason = "small numbers, and the very same bits"
+)]
+
 use axle_navigator::{EkfParams, Measurement, Method, Navigator, NavigatorParams, Range};
 use axle_schema::{
     Drivetrain, EncodersData, Metres, MetresPerSecond, Pose, Radians, RadiansPerSecond, Seconds, Track,

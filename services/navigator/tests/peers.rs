@@ -1,6 +1,20 @@
 //! What the tests of other projects prove about a fusion of odometry and fixes (WPILib's pose estimator and filter, BSD-3-
 //! Clause, at caf0fb2: the cases are theirs, the numbers are given again here, and no code of theirs is used).
 
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test ends at what is not as it should be, and says what it measured"
+)]
+#![allow(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::float_cmp,
+    reason = "small numbers, and the very same bits"
+)]
+
 mod robot;
 
 use axle_navigator::{EkfParams, Measurement, Method, Navigator, NavigatorParams};

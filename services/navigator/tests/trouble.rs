@@ -1,5 +1,19 @@
 //! What goes wrong on a robot: each fault is noticed with its evidence, and none spoils the pose for good.
 
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test ends at what is not as it should be, and says what it measured"
+)]
+#![allow(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::float_cmp,
+    reason = "small numbers, and the very same bits"
+)]
+
 mod robot;
 
 use axle_navigator::{

@@ -304,7 +304,7 @@ impl Timeline {
     fn forget(&mut self) {
         let oldest = self.newest_stamp() - self.window;
         while self.nodes.len() > 2 && (self.nodes[1].reading.stamp.0 <= oldest || self.nodes.len() > MOST) {
-            drop(self.nodes.pop_front());
+            let _ = self.nodes.pop_front();
             self.young = false;
         }
         let Some(first) = self.nodes.front().map(|node| node.reading.stamp.0) else { return };

@@ -83,10 +83,10 @@ impl Robot {
     /// Drives one step at these wheel speeds; gives what encoders and gyro say.
     pub(crate) fn drive(&mut self, left: f64, right: f64) -> [Measurement; 2] {
         let mut real = [left * DT, right * DT];
-        for side in 0..2 {
-            self.counted[side] += real[side];
-            real[side] += (self.k * real[side].abs()).sqrt() * self.random.normal();
-            real[side] *= 1.0 - self.slip[side];
+        for (side, way) in real.iter_mut().enumerate() {
+            self.counted[side] += *way;
+            *way += (self.k * way.abs()).sqrt() * self.random.normal();
+            *way *= 1.0 - self.slip[side];
         }
         let (x, y, theta) = arc(real[0], real[1], TRACK);
         self.truth = self.truth.moved(Metres(x), Metres(y), Radians(theta));
