@@ -19,6 +19,9 @@ pub(crate) struct Panel {
     lines: Vec<Line>,
 }
 
+/// Name, ink and points of a line.
+pub(crate) type NamedLine = (&'static str, usize, Vec<(f64, f64)>);
+
 /// One of its lines.
 struct Line {
     /// What the legend calls it; nothing for a line that looks like another one.
@@ -64,7 +67,7 @@ impl Panel {
     }
 
     /// Anything over time: lines with their names and inks; one without a name looks like another one.
-    pub(crate) fn of_lines(axis: &'static str, lines: Vec<(&'static str, usize, Vec<(f64, f64)>)>) -> Self {
+    pub(crate) fn of_lines(axis: &'static str, lines: Vec<NamedLine>) -> Self {
         let lines = lines.into_iter().map(|(name, index, points)| Line {
             name,
             style: line(ink(index).into(), 16),
