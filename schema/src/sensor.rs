@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 pub struct InertialData {
     /// Seconds since the boot of the robot process.
     pub stamp: Seconds,
-    /// Turn rate about the vertical axis, counter-clockwise positive.
+    /// Turn rate about the vertical axis, counter-clockwise positive: the mean since the reading before, so that the
+    /// readings sum up to the turn.
     pub gyro: RadiansPerSecond,
     /// Acceleration forward, where it is measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -4,7 +4,7 @@ pub(crate) mod drive;
 mod lines;
 mod tournament;
 
-pub(crate) use lines::{Chart, Convert};
+pub(crate) use lines::{Chart, Convert, Estimate};
 pub(crate) use tournament::Tournament;
 
 use crate::settings::Settings;
@@ -68,6 +68,8 @@ pub(crate) enum Command {
     Convert(Convert),
     /// Draw JSON lines or a recording as SVG: the path, and what the wheels do over time
     Chart(Chart),
+    /// Estimate where a robot was from a log of its measurements, by any method of the navigator
+    Estimate(Estimate),
     /// Compare the correctors on emulated robots in virtual time, or tune one
     Tournament(Tournament),
     /// Print the parameters of a service with their explanations

@@ -6,6 +6,7 @@ mod convert;
 mod docs;
 mod doctor;
 mod drive;
+mod estimate;
 pub(crate) mod go;
 mod graph;
 mod ls;
@@ -45,6 +46,7 @@ pub(crate) async fn dispatch(cli: Cli) -> anyhow::Result<()> {
         Command::Tap(args) => tap::tap(&settings, &args).await,
         Command::Convert(args) => convert::convert(&args),
         Command::Chart(args) => chart::draw(&args),
+        Command::Estimate(args) => estimate::estimate(&args),
         Command::Tournament(args) => tournament::tournament(&args),
         Command::Params { service } => {
             let entry = catalog::find(&service).ok_or_else(|| unknown_service(&service))?;

@@ -19,6 +19,9 @@ pub(crate) struct Panel {
     lines: Vec<Line>,
 }
 
+/// Name, ink and points of a line.
+pub(crate) type NamedLine = (&'static str, usize, Vec<(f64, f64)>);
+
 /// One of its lines.
 struct Line {
     /// What the legend calls it; nothing for a line that looks like another one.
@@ -61,6 +64,17 @@ impl Panel {
         // All left wheels lie below all right ones, of which none could be seen otherwise.
         lines[2..].sort_by_key(|line| line.is_right);
         Self { axis, lines }
+    }
+
+    /// Anything over time: lines with their names and inks; one without a name looks like another one.
+    pub(crate) fn of_lines(axis: &'static str, lines: Vec<NamedLine>) -> Self {
+        let lines = lines.into_iter().map(|(name, index, points)| Line {
+            name,
+            style: line(ink(index).into(), 16),
+            is_right: false,
+            points,
+        });
+        Self { axis, lines: lines.collect() }
     }
 
     pub(super) fn draw(&self, sheet: &Sheet<'_>) -> anyhow::Result<()> {

@@ -55,3 +55,29 @@ pub(crate) struct Chart {
     #[arg(long, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
 }
+
+/// Arguments of `axle estimate`.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Estimate {
+    /// JSON lines of measurements, or an MCAP recording; - is stdin
+    #[arg(value_name = "LOG")]
+    pub(crate) file: String,
+    /// arc, point-and-shoot, half-turn, accelerated, ticks or ekf [default: that of the parameters]
+    #[arg(long, value_name = "NAME", conflicts_with = "compare")]
+    pub(crate) method: Option<String>,
+    /// Parameters of the navigator [default: those that `axle params navigator` prints]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) params: Option<PathBuf>,
+    /// Print how far the estimate is from the truth, instead of the poses
+    #[arg(long)]
+    pub(crate) report: bool,
+    /// Run all methods, and print the report of each
+    #[arg(long)]
+    pub(crate) compare: bool,
+    /// Print the report as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Draw the paths, and the errors over time
+    #[arg(long, value_name = "FILE")]
+    pub(crate) svg: Option<PathBuf>,
+}

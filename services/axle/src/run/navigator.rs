@@ -2,7 +2,7 @@
 
 use super::Context;
 use crate::params::load;
-use axle_navigator::{Navigator, NavigatorParams};
+use axle_navigator::{Measurement, Navigator, NavigatorParams};
 use axle_schema::key;
 use axle_schema::meta::Cause;
 
@@ -21,7 +21,17 @@ pub(crate) async fn run(mut context: Context) -> anyhow::Result<()> {
             () = context.stop.wait() => return Ok(()),
         };
         let cause = heard.meta.map(|meta| Cause { source: meta.source, seq: meta.seq });
-        let newest = heard.message.encoders.into_iter().filter_map(|datum| navigator.take(datum)).last();
+        let window = heard.message;
+        // What a window repeats is known by its stamp, and counts once.
+        let others = window.inertial.into_iter().map(Measurement::Inertial);
+        for measurement in others.chain(window.fixes.into_iter().map(Measurement::Fix)) {
+            let _ = navigator.measure(&measurement);
+        }
+        let newest = window.encoders.into_iter().filter_map(|datum| navigator.take(datum)).last();
+        for event in navigator.events() {
+            tracing::warn!("{event}");
+        }
+        drop(navigator.innovations());
         if let Some(data) = newest
             && let Err(refusal) = pose.put(&data, cause)
         {
