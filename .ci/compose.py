@@ -273,9 +273,9 @@ def cut(mesh, link):
     )
     try:
         # Straight on, far from both ends of the way.
-        gate.until("the robot drives", lambda said: is_state(said) and min(wheels(said)) > 0.3, 20)
+        heard = gate.until("the robot drives", lambda said: is_state(said) and min(wheels(said)) > 0.3, 20)
         must(["docker", "network", "disconnect", link, router])
-        heard = gate.until("the wheels stand", lambda said: is_state(said) and stands(said), 10)
+        heard += gate.until("the wheels stand", lambda said: is_state(said) and stands(said), 10)
         words = task.communicate(timeout=30)[1].strip()
     finally:
         task.kill()
