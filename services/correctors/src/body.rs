@@ -1,5 +1,7 @@
 //! The robot as a corrector that works with poses knows it: where it is, where it will be, what it was told.
 
+use crate::friction::Friction;
+use crate::grain::Grain;
 use crate::newest::{Newest, Watch};
 use crate::stall::Stall;
 use crate::wheels::Wheels;
@@ -20,6 +22,7 @@ pub(crate) struct Body {
     heading: Radians,
     /// The distances of the wheels at the beginning and now, where they are seen.
     encoders: Option<(EncodersData, EncodersData)>,
+    grain: Grain,
     pub(crate) wheels: Wheels,
     stall: Stall,
     /// The beat of the pose before the newest one.
@@ -27,15 +30,16 @@ pub(crate) struct Body {
 }
 
 impl Body {
-    /// A robot at rest where it is seen. `lead` is the time from a measurement to the obedience to what it led to.
+    /// A robot at rest where it is seen. `lead` is the time from a measurement to the obedience to what it led to, `push`
+    /// is what a wheel that does not move is asked for more.
     ///
     /// # Errors
     /// Refuses when no pose is seen, with what to start.
     pub(crate) fn new(
         robot: Drivetrain,
-        period: Seconds,
-        lead: Seconds,
+        (period, lead): (Seconds, Seconds),
         watch: Watch,
+        push: MetresPerSecond,
         seen: &Seen,
     ) -> Result<Self, Refusal> {
         let newest = Newest::new(seen.pose, seen.at, watch, robot)?;
@@ -47,7 +51,8 @@ impl Body {
             newest,
             heading,
             encoders: seen.encoders.map(|first| (first, first)),
-            wheels: Wheels::new(robot, period),
+            grain: Grain::default(),
+            wheels: Wheels::new(robot, period, Friction::new(push.0)),
             stall: Stall::default(),
             counted: seen.at,
         })
@@ -59,6 +64,7 @@ impl Body {
     /// Fails when poses stop, jump or go back in time, and when the robot is blocked.
     pub(crate) fn hear(&mut self, seen: &Seen) -> Result<(), Refusal> {
         if let (Some((_, newest)), Some(encoders)) = (&mut self.encoders, seen.encoders) {
+            self.grain.take(newest, &encoders);
             *newest = encoders;
         }
         if let Some(before) = self.newest.hear(seen.pose, seen.at)? {
@@ -67,7 +73,8 @@ impl Body {
             self.heading += turn;
             let made = ways(before.pose, value.pose, turn, self.robot);
             let (from, to) = (self.counted - self.lead, seen.at - self.lead);
-            let asked = self.wheels.covered(from, to).map(Metres);
+            let asked = self.wheels.covered(from, to);
+            let asked = self.wheels.learn(asked, made.map(|way| way.0), to - from).map(Metres);
             self.counted = seen.at;
             self.stall.count(asked, made, to - from, value.stamp, self.watch.blocked)?;
         }
@@ -87,6 +94,11 @@ impl Body {
     /// The stamp of the newest measurement, by the robot's clock.
     pub(crate) const fn stamp(&self) -> Seconds {
         self.newest.value().stamp
+    }
+
+    /// What coarse encoders leave unknown, m.
+    pub(crate) fn blur(&self) -> f64 {
+        self.grain.blur()
     }
 
     /// Time since the task began, by the robot's clock at the newest measurement.

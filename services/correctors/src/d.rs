@@ -18,6 +18,7 @@
 //! the robot's clock goes back, and when the goal is missed grossly. Silence then makes the gate brake.
 
 use crate::due::Due;
+use crate::grain::Grain;
 use crate::newest::{Newest, Watch};
 use axle_schema::contract::{Account, Bounds, Corrector, Params, Seen, Step};
 use axle_schema::refusal::within;
@@ -142,6 +143,7 @@ pub struct DCorrector {
     /// The robot time at which the plan begins; known from the first beat on.
     zero: Option<Seconds>,
     newest: Newest<EncodersData>,
+    grain: Grain,
     /// The movement that was commanded last.
     last: Dwm,
     /// The stamp since which both wheels are within the tolerance of the goal.
@@ -172,7 +174,8 @@ impl Corrector for DCorrector {
         let (params, begin) = (params.clone(), *newest.value());
         let (zero, calm, nothing) = (None, None, Sides::new(0.0, 0.0));
         let (sum, before, is_limited) = (nothing, nothing, false);
-        Ok(Self { params, period, due, begin, zero, newest, last, calm, sum, before, is_limited })
+        let grain = Grain::default();
+        Ok(Self { params, period, due, begin, zero, newest, grain, last, calm, sum, before, is_limited })
     }
 
     fn step(&mut self, seen: &Seen) -> Step {
@@ -202,7 +205,9 @@ impl Corrector for DCorrector {
 
 impl DCorrector {
     fn decide(&mut self, seen: &Seen) -> Result<Step, Refusal> {
-        self.newest.hear(seen.encoders, seen.at)?;
+        if let Some(before) = self.newest.hear(seen.encoders, seen.at)? {
+            self.grain.take(&before, self.newest.value());
+        }
         // The robot time at which the command of this beat will be obeyed.
         let obeyed = self.newest.elapsed() + self.newest.age(seen.at) + self.params.lead;
         let zero = *self.zero.get_or_insert(obeyed);
@@ -280,6 +285,8 @@ impl DCorrector {
     /// What happens after the last movement of the plan, by the stamps: without measurements nothing settles.
     fn finish(&mut self, error: Sides<Metres>) -> Result<Step, Refusal> {
         let DParams { tolerance, settle, patience, .. } = self.params;
+        // Nobody can stand more exactly than is measured.
+        let tolerance = tolerance.max(Metres(self.grain.blur()));
         let worst = error.left.abs().max(error.right.abs());
         let stamp = self.newest.value().stamp;
         self.calm = if worst <= tolerance { self.calm.or(Some(stamp)) } else { None };

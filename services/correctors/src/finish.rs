@@ -5,7 +5,7 @@
 
 use axle_schema::contract::Bounds;
 use axle_schema::refusal::within;
-use axle_schema::{Metres, MetresPerSecond, Radians, Refusal, Seconds};
+use axle_schema::{Metres, MetresPerSecond, Radians, Refusal, Seconds, Track};
 use serde::{Deserialize, Serialize};
 
 /// How a task ends: the table `[finish]` of the parameters.
@@ -26,6 +26,8 @@ pub struct Finish {
     pub approach: f64,
     /// The slowest speed that moves the wheels, 0 to 0.1 m/s.
     pub creep: MetresPerSecond,
+    /// How much more a wheel is asked for at most that does not move all the same, 0 to 0.3 m/s.
+    pub push: MetresPerSecond,
 }
 
 impl Default for Finish {
@@ -33,11 +35,12 @@ impl Default for Finish {
         Self {
             tolerance: Metres(0.004),
             heading: Radians(0.01),
-            radius: Metres(0.05),
+            radius: Metres(0.04),
             settle: Seconds(0.2),
             patience: Seconds(4.0),
             approach: 4.0,
             creep: MetresPerSecond(0.015),
+            push: MetresPerSecond(0.06),
         }
     }
 }
@@ -50,11 +53,19 @@ impl Bounds for Finish {
         within("finish.settle in s", self.settle.0, 0.0, 5.0)?;
         within("finish.patience in s", self.patience.0, 0.5, 60.0)?;
         within("finish.approach in 1/s", self.approach, 0.5, 20.0)?;
-        within("finish.creep in m/s", self.creep.0, 0.0, 0.1)
+        within("finish.creep in m/s", self.creep.0, 0.0, 0.1)?;
+        within("finish.push in m/s", self.push.0, 0.0, 0.3)
     }
 }
 
 impl Finish {
+    /// The same with tolerances that encoders can resolve that leave a wheel unknown by `blur`, in m: else the robot
+    /// would hunt between two ticks for ever.
+    pub(crate) fn resolved(self, blur: f64, track: Track) -> Self {
+        let (tolerance, heading) = (self.tolerance.0.max(blur), self.heading.0.max(blur / track.get()));
+        Self { tolerance: Metres(tolerance), heading: Radians(heading), ..self }
+    }
+
     /// The speed at which what is `left` is approached: 0 in the dead zone, then at least the creeping speed, then
     /// `approach` times what is left, and farther away what brakes at `deceleration`.
     ///

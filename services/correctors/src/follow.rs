@@ -15,12 +15,14 @@ use crate::path::{Limits, Path, Place, travel};
 use crate::route::{self, Part};
 use axle_schema::contract::{Account, Bounds as _, Seen, Step};
 use axle_schema::refusal::within;
-use axle_schema::{Drivetrain, Plan, Pose, Refusal, Seconds, Twist};
+use axle_schema::{Drivetrain, Plan, Pose, Radians, Refusal, Seconds, Twist};
 
 /// The jump of a wheel speed at a joint that is spread over this time by the wheels, s.
 const JOINT: f64 = 0.08;
 /// A turn before a way that is shorter than this many radii is driven, even if the steering would not need it.
-const SHORT: f64 = 4.0;
+const SHORT: f64 = 5.0;
+/// The heading at the end of a path is left alone within this, rad: to turn back less is to hunt.
+const ALIGNED: f64 = 0.13;
 /// How many tolerances a turn may be off when patience is over.
 const NEAR: f64 = 5.0;
 
@@ -119,6 +121,8 @@ pub(crate) trait Steering {
 pub(crate) struct Follower<S> {
     steering: S,
     rules: Rules,
+    /// How a task ends where the encoders are good enough for it.
+    finish: Finish,
     body: Body,
     parts: Vec<Part>,
     /// The part that is driven, what is left of those after it in m, and how far the robot is on it.
@@ -152,12 +156,16 @@ impl<S: Steering> Follower<S> {
         rules.check()?;
         let Rules { robot, effort, .. } = rules;
         let limits = Limits { robot, effort, turn: steering.longest_turn() };
-        let parts = route::parts(plan, &limits, robot.wheel_acceleration.0 * JOINT)?;
-        let body = Body::new(robot, rules.period, rules.lead, rules.watch, seen)?;
+        let mut parts = route::parts(plan, &limits, robot.wheel_acceleration.0 * JOINT)?;
+        let body = Body::new(robot, (rules.period, rules.lead), rules.watch, rules.finish.push, seen)?;
         if !parts.is_empty() {
             route::check_start(plan.start, body.pose())?;
         }
         let goal = plan.legs.iter().fold(plan.start, |at, leg| leg.geometry.end_from(at));
+        if matches!(parts.last(), Some(Part::Way(_))) {
+            // Who steers to a point may come to it from any side: what is worth mentioning is turned back.
+            parts.push(Part::Turn { from: goal.heading, angle: Radians::ZERO, loose: ALIGNED });
+        }
         let arm = robot.track.get() / 2.0;
         let whole = parts.iter().map(|part| length(part, arm)).sum::<f64>();
         let later = whole - parts.first().map_or(0.0, |part| length(part, arm));
@@ -165,6 +173,7 @@ impl<S: Steering> Follower<S> {
         let mut follower = Self {
             steering,
             rules,
+            finish: rules.finish,
             body,
             parts,
             part: 0,
@@ -199,6 +208,7 @@ impl<S: Steering> Follower<S> {
             return self.body.rest(seen.at);
         }
         self.body.hear(seen)?;
+        self.rules.finish = self.finish.resolved(self.body.blur(), self.rules.robot.track);
         let pose = self.body.pose_at(seen.at);
         let mut want = self.want(pose);
         let is_last = |part: usize, parts: &[Part]| part + 1 >= parts.len();
@@ -254,11 +264,11 @@ impl<S: Steering> Follower<S> {
     fn want(&mut self, pose: Pose) -> Want {
         let stands = self.body.wheels.stand();
         let (want, left) = match &self.parts[self.part] {
-            Part::Turn { from, angle } => {
+            Part::Turn { from, angle, loose } => {
                 let heading = pose.heading.0;
                 let planned = || heading - (pose.heading - *from).wrapped().0 + angle.0;
                 let rest = *self.heading.get_or_insert_with(planned) - heading;
-                let omega = self.rules.turning(rest, self.rules.finish.heading.0, stands);
+                let omega = self.rules.turning(rest, self.rules.finish.heading.0.max(*loose), stands);
                 let aim = Aim { v: 0.0, omega, off: rest };
                 let want = if omega.abs() > 0.0 { Want::Move(aim) } else { Want::Rest };
                 (want, rest.abs() * self.rules.robot.track.get() / 2.0)
@@ -267,7 +277,7 @@ impl<S: Steering> Follower<S> {
                 let pose = travel(pose, path.forward);
                 self.place = path.place(pose, self.place, self.steering.early());
                 let along = along(path, self.place, pose, self.rules.finish.radius.0);
-                let last = Twist::of_wheels(self.body.wheels.last().end(), self.rules.robot.track);
+                let last = Twist::of_wheels(self.body.wheels.speeds(), self.rules.robot.track);
                 let sign = if path.forward { 1.0 } else { -1.0 };
                 let twist = Twist { v: last.v * sign, ..last };
                 let way = Way { path, place: self.place, pose, speed: 0.0, twist, rules: &self.rules };
@@ -285,8 +295,9 @@ impl<S: Steering> Follower<S> {
     fn has_arrived(&self) -> bool {
         let (pose, finish) = (self.body.pose(), &self.rules.finish);
         match &self.parts[self.part] {
-            Part::Turn { .. } => {
-                self.heading.is_some_and(|heading| (heading - pose.heading.0).abs() <= finish.heading.0)
+            Part::Turn { loose, .. } => {
+                let most = finish.heading.0.max(*loose);
+                self.heading.is_some_and(|heading| (heading - pose.heading.0).abs() <= most)
             }
             Part::Way(path) => {
                 let along = along(path, self.place, travel(pose, path.forward), finish.radius.0);
@@ -300,7 +311,7 @@ impl<S: Steering> Follower<S> {
         let Rules { finish, .. } = self.rules;
         let pose = self.body.pose();
         let turn = self.heading.map_or(0.0, |heading| heading - pose.heading.0);
-        let near = self.part + 1 == self.parts.len() && turn.abs() <= finish.heading.0 * NEAR;
+        let near = self.part + 1 == self.parts.len() && turn.abs() <= (finish.heading.0 * NEAR).max(ALIGNED);
         let far = self.goal.distance(pose);
         if near && far <= finish.radius {
             return self.body.rest(at);

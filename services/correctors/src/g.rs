@@ -18,6 +18,8 @@
 
 use crate::finish::{Finish, Progress, Since, Zone};
 use crate::follow::{Rules, check_period};
+use crate::friction::Friction;
+use crate::grain::Grain;
 use crate::newest::{Newest, Watch};
 use crate::route;
 use crate::stall::Stall;
@@ -145,6 +147,7 @@ pub struct GCorrector {
     turned: Option<Turned>,
     wheels: Wheels,
     stall: Stall,
+    grain: Grain,
     /// The error of the following wheel, m, and of its speed, m/s, at the newest measurement.
     error: f64,
     rate: f64,
@@ -185,8 +188,9 @@ impl Corrector for GCorrector {
             begin: *newest.value(),
             newest,
             turned,
-            wheels: Wheels::new(robot, period),
+            wheels: Wheels::new(robot, period, Friction::new(params.finish.push.0)),
             stall: Stall::default(),
+            grain: Grain::default(),
             error: 0.0,
             rate: 0.0,
             change: 0.0,
@@ -253,7 +257,9 @@ impl GCorrector {
         let span = before.span_to(self.newest.value());
         let (from, to) = (self.counted - self.rules.lead, seen.at - self.rules.lead);
         self.counted = seen.at;
-        let asked = self.wheels.covered(from, to).map(Metres);
+        let asked = self.wheels.covered(from, to);
+        let asked = self.wheels.learn(asked, span.sides().map(|way| way.0), to - from).map(Metres);
+        self.grain.take(&before, self.newest.value());
         self.stall.count(asked, span.sides(), to - from, stamp, self.params.watch.blocked)?;
         let real = self.real();
         let error = self.legs.get(self.leg).map_or(0.0, |leg| leg.error(real));
@@ -283,10 +289,15 @@ impl GCorrector {
         }
     }
 
+    /// How a task ends, with tolerances that the encoders can resolve.
+    fn finish(&self) -> Finish {
+        self.params.finish.resolved(self.grain.blur(), self.params.robot.track)
+    }
+
     /// The wheel speeds of the next command, for distances `at` which it will be obeyed, m/s.
     fn speeds(&self, at: Sides<f64>) -> Sides<f64> {
         let Some(leg) = self.legs.get(self.leg) else { return Sides::new(0.0, 0.0) };
-        let (finish, ratio) = (&self.params.finish, &self.params.ratio);
+        let (finish, ratio) = (self.finish(), &self.params.ratio);
         let tolerance = finish.tolerance.0;
         let zone = Zone { tolerance, slowest: self.rules.creep(tolerance), stands: self.wheels.stand() };
         let deceleration = self.rules.deceleration();
@@ -304,7 +315,7 @@ impl GCorrector {
     /// The end of the task, if it is there.
     fn end(&mut self, rests: bool, at: Sides<f64>) -> Option<Result<Step, Refusal>> {
         let leg = self.legs.get(self.leg)?;
-        let (finish, real, stamp) = (&self.params.finish, self.real(), self.newest.value().stamp);
+        let (finish, real, stamp) = (self.finish(), self.real(), self.newest.value().stamp);
         let worst = |at: Sides<f64>| (leg.s - leg.covered(at)).abs().max(leg.error(at).abs());
         let later: f64 = self.legs.iter().skip(self.leg + 1).map(|leg| leg.s).sum();
         let is_last = self.leg + 1 == self.legs.len();

@@ -71,7 +71,8 @@ impl Default for LtvParams {
             speed: MetresPerSecond(0.2),
             turn_rate: RadiansPerSecond(1.0),
             lost: Metres(0.5),
-            finish: Finish::default(),
+            // Its errors grow until the wheels move.
+            finish: Finish { push: MetresPerSecond(0.0), ..Finish::default() },
             watch: Watch::default(),
             robot: Drivetrain::default(),
         }
@@ -129,7 +130,7 @@ impl Corrector for LtvCorrector {
         check_period(period)?;
         task.plan.check()?;
         let mut due = Due::new(task.plan, &params.robot)?;
-        let body = Body::new(params.robot, period, params.lead, params.watch, seen)?;
+        let body = Body::new(params.robot, (period, params.lead), params.watch, params.finish.push, seen)?;
         due.place(body.pose(), params.robot.track);
         let (gains, rules) = (Gains::new(params, period), params.rules(period));
         Ok(Self {
@@ -186,7 +187,8 @@ impl LtvCorrector {
 
     /// What happens after the last movement of the plan, `now` by its clock; `error` is how the goal is seen.
     fn finish(&mut self, error: Pose, now: f64, at: Seconds) -> Result<Step, Refusal> {
-        let finish = self.rules.finish;
+        let blur = self.body.blur();
+        let finish = self.rules.finish.resolved(blur, self.params.robot.track);
         // What is left shows when the robot stands: corrected sooner, the wheels would run to and fro.
         if now < self.due.total() + (self.rules.lead + self.rules.period * 2.0).0 {
             return self.body.drive(0.0, 0.0, at);
@@ -194,7 +196,7 @@ impl LtvCorrector {
         // Each wheel has its own way to go, so that none runs to and fro for the sake of the other.
         let arm = self.params.robot.track.get() / 2.0;
         let turn = error.heading.0 * arm;
-        let tolerance = finish.tolerance.0.min(finish.heading.0 * arm);
+        let tolerance = finish.tolerance.0.min(finish.heading.0 * arm).max(blur);
         let zone = Zone { tolerance, slowest: self.rules.creep(tolerance), stands: false };
         let deceleration = self.rules.deceleration();
         let speeds = Sides::new(error.x.0 - turn, error.x.0 + turn)

@@ -16,6 +16,8 @@ pub(crate) enum Part {
         from: Radians,
         /// Positive to the left.
         angle: Radians,
+        /// It may miss its heading by so much, rad, where that is more than the tolerance.
+        loose: f64,
     },
     /// Along a path.
     Way(Path),
@@ -51,7 +53,7 @@ pub(crate) fn parts(plan: &Plan, limits: &Limits, jump: f64) -> Result<Vec<Part>
         match geometry {
             _ if goes_on => {}
             Geometry::Turn { angle } if angle.0.abs() > 0.0 => {
-                parts.push(Part::Turn { from: at.heading, angle });
+                parts.push(Part::Turn { from: at.heading, angle, loose: 0.0 });
             }
             Geometry::Turn { .. } => {}
             _ => parts.extend(Path::begin(at, leg, limits).map(Part::Way)),

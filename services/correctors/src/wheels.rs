@@ -3,6 +3,7 @@
 //! Commands take their time to the wheels, and measurements to the corrector. What was commanded in between is known,
 //! so that the state in which the next command will find the robot can be computed from the newest measurement.
 
+use crate::friction::Friction;
 use axle_schema::{Drivetrain, Dwm, EncodersSpan, MetresPerSecond, Pose, Refusal, Seconds, Sides};
 use std::collections::VecDeque;
 
@@ -15,14 +16,17 @@ pub(crate) struct Wheels {
     robot: Drivetrain,
     period: Seconds,
     last: Dwm,
-    /// The commands and their beats, oldest first.
+    /// What is added to every speed, since motors rub.
+    pub(crate) friction: Friction,
+    /// What was to come of the commands, and their beats, oldest first.
     said: VecDeque<(Seconds, Dwm)>,
 }
 
 impl Wheels {
     /// Wheels at rest.
-    pub(crate) fn new(robot: Drivetrain, period: Seconds) -> Self {
-        Self { robot, period, last: Dwm::rest(Seconds::ZERO), said: VecDeque::with_capacity(MEMORY) }
+    pub(crate) fn new(robot: Drivetrain, period: Seconds, friction: Friction) -> Self {
+        let (last, said) = (Dwm::rest(Seconds::ZERO), VecDeque::with_capacity(MEMORY));
+        Self { robot, period, last, friction, said }
     }
 
     /// The movement from the end of the last one towards `target`, both wheels in step, as far as the limits allow.
@@ -32,6 +36,7 @@ impl Wheels {
     /// # Errors
     /// Refuses speeds that are not finite.
     pub(crate) fn command(&mut self, target: Sides<MetresPerSecond>, at: Seconds) -> Result<Dwm, Refusal> {
+        let target = self.friction.overcome(target.map(|speed| speed.0)).map(MetresPerSecond);
         let peak = target.left.abs().max(target.right.abs()).0;
         let fit = (self.robot.wheel_speed.0 / peak).min(1.0);
         let from = self.last.end();
@@ -50,13 +55,31 @@ impl Wheels {
         if self.said.len() == MEMORY {
             self.said.pop_front();
         }
-        self.said.push_back((at, self.last));
+        self.said.push_back((at, Dwm::new(self.felt(from), self.felt(end), self.period)?));
         Ok(self.last)
     }
 
     /// What was commanded last.
     pub(crate) const fn last(&self) -> &Dwm {
         &self.last
+    }
+
+    /// How fast the wheels run after the last command, as far as it is known how they rub.
+    pub(crate) fn speeds(&self) -> Sides<MetresPerSecond> {
+        self.felt(self.last.end())
+    }
+
+    fn felt(&self, speeds: Sides<MetresPerSecond>) -> Sides<MetresPerSecond> {
+        self.friction.felt(speeds.map(|speed| speed.0)).map(MetresPerSecond)
+    }
+
+    /// Learns how the wheels rub from the ways of a time, in m; says what they were really asked, for the sake of it.
+    pub(crate) fn learn(&mut self, asked: Sides<f64>, made: Sides<f64>, passed: Seconds) -> Sides<f64> {
+        self.friction.learn(asked, made, passed);
+        if passed.0 <= 0.0 {
+            return asked;
+        }
+        self.friction.overcome(asked.map(|way| way / passed.0)).map(|speed| speed * passed.0)
     }
 
     /// Whether the last command ends at rest.
@@ -109,7 +132,7 @@ mod tests {
 
     #[test]
     fn a_command_goes_as_far_as_the_limits_allow_with_both_wheels_in_step() {
-        let mut wheels = Wheels::new(Drivetrain::default(), Seconds(0.1));
+        let mut wheels = Wheels::new(Drivetrain::default(), Seconds(0.1), Friction::new(0.06));
         // 1.5 m/s² for 0.1 s are 0.15 m/s; the left wheel makes half the way of the right one.
         let dwm = wheels.command(both(0.2, 0.4), Seconds(0.0)).expect("finite");
         assert!((dwm.end().left.0 - 0.075).abs() < 1e-15 && (dwm.end().right.0 - 0.15).abs() < 1e-15);
@@ -125,7 +148,7 @@ mod tests {
 
     #[test]
     fn what_was_commanded_is_covered_between_any_two_times() {
-        let mut wheels = Wheels::new(Drivetrain::default(), Seconds(0.1));
+        let mut wheels = Wheels::new(Drivetrain::default(), Seconds(0.1), Friction::new(0.06));
         assert_eq!(wheels.covered(Seconds(-1.0), Seconds(1.0)), Sides::new(0.0, 0.0));
         wheels.command(both(0.1, 0.1), Seconds(0.0)).expect("finite");
         wheels.command(both(0.1, 0.1), Seconds(0.1)).expect("finite");
