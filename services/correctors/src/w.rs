@@ -1,5 +1,5 @@
-//! The W-corrector: drives along a vector field (paper, III.C), in the two parts that the paper announces: a [`field`]
-//! that says with which velocity to be where, and a [`driver`] that makes the robot obey it.
+//! The W-corrector: drives along a vector field (paper, III.C), in the two parts that the paper announces: a `field`
+//! that says with which velocity to be where, and a `driver` that makes the robot obey it.
 //!
 //! Hears a [`Task<Plan>`] and poses, says one [`Dwm`](axle_schema::Dwm) at every beat. In the paper it takes the way
 //! points. Here it takes the plan, and the ends of its legs are the way points: so one corrector serves points, lines,

@@ -1,6 +1,6 @@
 //! Navigator: where the robot is.
 //!
-//! Hears [`EncodersData`] in the order of its stamps, says [`NavigatorData`] in the frame `odom` (REP-105): the pose,
+//! Hears `EncodersData` in the order of its stamps, says `NavigatorData` in the frame `odom` (REP-105): the pose,
 //! the twist and the covariance at each reading (paper, section II: "simple integration or Kalman's filter"). The method
 //! "ekf" hears a gyro, fixes and ranges too, in any order ([`Navigator::measure`]); [`Position`] has the pose in `map`.
 //!
