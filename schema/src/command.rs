@@ -54,7 +54,8 @@ pub struct Lease {
     pub epoch: u32,
     /// The robot's clock at the grant: an echo for the first command.
     pub tick: Tick,
-    /// After this time without a command the wheels brake and the lease ends.
+    /// After this time without a command the wheels brake and the lease ends. The first command, before which nothing
+    /// moves, may take longer: as long as an echo may be old, and a period.
     pub silence_stop: Seconds,
 }
 impl Message for Lease {
@@ -136,10 +137,23 @@ pub struct Enable {
     pub echo: Tick,
     /// Who enables, in words that a person understands.
     pub by: String,
+    /// As what: only a person lets a robot move again, so that below [`Class::Manual`] it is refused. Left out it is that.
+    #[serde(default = "manual", skip_serializing_if = "is_manual")]
+    pub class: Class,
+}
+const fn manual() -> Class {
+    Class::Manual
+}
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "the shape that serde asks for")]
+const fn is_manual(class: &Class) -> bool {
+    matches!(class, Class::Manual)
 }
 impl Message for Enable {
     const NAME: &'static str = "Enable";
     const LIMIT: usize = 512;
+    fn check(&self) -> Result<(), Refusal> {
+        crate::plan::limit_list("letters of who enables", self.by.len(), 96)
+    }
 }
 
 /// What the wheels are doing.

@@ -105,6 +105,10 @@ pub trait Corrector: Sized + Send + 'static {
     /// One beat. Never called twice with the same `seen.at`.
     fn step(&mut self, seen: &Seen) -> Step;
 
+    /// The gate had taken the wheels back, because commands were lost, and gives them again: the robot has braked, and
+    /// nobody was obeyed for the time `pause`, by the beats. A step follows at the same beat.
+    fn resume(&mut self, seen: &Seen, pause: Seconds);
+
     /// What the last beat was about.
     fn account(&self) -> Account;
 }

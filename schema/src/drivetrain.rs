@@ -24,6 +24,14 @@ pub struct Drivetrain {
     pub turn_rate: RadiansPerSecond,
 }
 
+impl Drivetrain {
+    /// Radius of the circle around the middle of the axle that holds the whole robot where nobody says another: 0.25 m.
+    ///
+    /// A plan that is looked at before and the one that the pilot has made are of one robot, so Pathfinder's `body` and the
+    /// pilot's `radius` begin with the same.
+    pub const BODY: Metres = Metres(0.25);
+}
+
 impl Default for Drivetrain {
     /// A small indoor robot: 30 cm between the wheels, half a metre per second.
     fn default() -> Self {

@@ -5,6 +5,7 @@
 //!
 //! Chunks that begin with `@` are hidden from a tap on `axle/**`: presence and status are asked for by name only.
 
+use crate::calibration::{Calibrate, Calibrated, GetCalibration, Raw, SignalsData, WheelSpeeds};
 use crate::codec::{Message, decode, schema_of};
 use crate::command::{AllStop, Command, Done, Enable, GateState, Lease, LeaseAsk, Release};
 use crate::differential_drive::{
@@ -12,16 +13,28 @@ use crate::differential_drive::{
     ResetEncoders, RotateDegrees, SetDrivePower, SetDriveSpeed, StopDrive,
 };
 use crate::id::{ALL, Boot, RobotId};
-use crate::plan::{Drive, DriveAsk, Plan, PlanAsk};
+use crate::log::{LogLine, SetLog};
+use crate::map::{MapAsk, MapData};
+use crate::plan::{Drive, DriveAsk, Plan, PlanAsk, PlanProgress};
 use crate::presence::{Status, StatusAsk};
 use crate::task::{Accepted, Cancel, CorrectorProgress, GoAsk, PilotProgress, Task};
+use crate::trace::{Answered, Trace};
+use crate::traffic::{Claim, Clearance, Confirm, TrafficAsk, TrafficState};
 use crate::window::{Window, WindowAsk};
-use crate::{Dwm, EncodersData, Fix, InertialData, NavigatorData, Refusal, Signals, WayTask};
+use crate::{
+    Dwm, EncodersData, Fix, GetPosition, InertialData, NavigatorData, NavigatorEvent, Position, Range,
+    Refusal, SetPosition, Signals, WayTask,
+};
 use std::fmt;
 use std::marker::PhantomData;
 
+mod board;
 mod port;
+mod table;
+pub use board::{BATTERY, BOARD, CONTACTS, SERVOS};
 pub use port::Port;
+pub use table::TABLE;
+use table::readers;
 
 /// The first chunk of every key.
 const ROOT: &str = "axle";
@@ -95,6 +108,11 @@ impl<M: Message> Stream<M> {
     #[must_use]
     pub fn of_every_robot(&self) -> Key<M> {
         self.key("*")
+    }
+    /// The key of a service that works for every robot.
+    #[must_use]
+    pub fn of_all_robots(&self) -> Key<M> {
+        self.key(ALL)
     }
     fn key(&self, robot: &str) -> Key<M> {
         let text = format!("{ROOT}/{robot}/{}/{}", self.service, self.name);
@@ -207,8 +225,22 @@ pub const ENCODERS: Stream<EncodersData> = Stream::new("robot", "encoders", Urge
 pub const INERTIAL: Stream<InertialData> = Stream::new("robot", "inertial", Urgency::Control);
 /// Absolute positions.
 pub const FIX: Stream<Fix> = Stream::new("robot", "fix", Urgency::Control);
+/// Distances to known points.
+pub const RANGE: Stream<Range> = Stream::new("robot", "range", Urgency::Control);
 /// Duty cycles given to the motors.
 pub const SIGNALS: Stream<Signals> = Stream::new("robot", "signals", Urgency::Report);
+/// Duty cycles with their stamps, and what the encoders counted before any calibration.
+pub const MOTORS: Stream<SignalsData> = Stream::new("robot", "motors", Urgency::Report);
+/// The calibration that the owner of the wheels applies.
+pub const CALIBRATION: Call<GetCalibration, Calibrated> = Call::new("robot", "calibration");
+/// Has a calibration applied and kept.
+pub const CALIBRATE: Call<Calibrate, Done> = Call::new("robot", "calibrate");
+/// Lets the speeds of a lease go to the motors without the calibration.
+pub const RAW: Call<Raw, Done> = Call::new("robot", "raw");
+/// Speeds to signals.
+pub const TO_SIGNALS: Call<WheelSpeeds, Signals> = Call::new("calibrator", "signals");
+/// Signals to speeds.
+pub const TO_SPEEDS: Call<Signals, WheelSpeeds> = Call::new("calibrator", "speeds");
 /// The true pose of an emulated robot.
 pub const TRUTH: Stream<NavigatorData> = Stream::new("emulator", "truth", Urgency::Report);
 /// Movements for the wheels.
@@ -229,12 +261,32 @@ pub const RECENT: Stream<Window> = Stream::new("source", "recent", Urgency::Cont
 pub const WINDOW: Call<WindowAsk, Window> = Call::new("source", "window");
 /// The estimated pose.
 pub const POSE: Stream<NavigatorData> = Stream::new("navigator", "pose", Urgency::Control);
+/// The estimated pose in both frames, and how `odom` lies in `map`.
+pub const POSITION: Stream<Position> = Stream::new("navigator", "position", Urgency::Control);
+/// What is not as it should be.
+pub const NAVIGATOR_EVENT: Stream<NavigatorEvent> = Stream::new("navigator", "event", Urgency::Task);
+/// Where the robot is.
+pub const GET_POSITION: Call<GetPosition, Position> = Call::new("navigator", "get-position");
+/// An absolute reference.
+pub const SET_POSITION: Call<SetPosition, Position> = Call::new("navigator", "set-position");
 /// Way points to geometries.
 pub const PLAN: Call<PlanAsk, Plan> = Call::new("pathfinder", "plan");
+/// How far a search for a plan is.
+pub const PLAN_PROGRESS: Stream<PlanProgress> = Stream::new("pathfinder", "progress", Urgency::Report);
+/// Ends a search for a plan.
+pub const PLAN_CANCEL: Stream<Cancel> = Stream::new("pathfinder", "cancel", Urgency::Task);
+/// The map that robots share.
+pub const MAP: Call<MapAsk, MapData> = Call::new("map", "get");
 /// Geometries to movements.
 pub const DRIVE: Call<DriveAsk, Drive> = Call::new("pathdriver", "drive");
 /// Drives a task.
 pub const GO: Call<GoAsk, Accepted> = Call::new("pilot", "go");
+/// A person's word that the robot may drive on.
+pub const CONFIRM: Call<Confirm, Done> = Call::new("pilot", "confirm");
+/// Where a robot of a fleet is, and how far it may drive.
+pub const CLAIM: Call<Claim, Clearance> = Call::new("traffic", "claim");
+/// Who waits for whom.
+pub const TRAFFIC: Call<TrafficAsk, TrafficState> = Call::new("traffic", "state");
 /// Ends a task before its time.
 pub const GO_CANCEL: Call<Cancel, Done> = Call::new("pilot", "cancel");
 /// How far the pilot is.
@@ -300,6 +352,28 @@ pub const fn corrector_progress(service: &'static str) -> Stream<CorrectorProgre
     Stream::new(service, "progress", Urgency::Control)
 }
 
+/// What the service `service` logs.
+#[must_use]
+pub const fn log_of(service: &'static str) -> Stream<LogLine> {
+    Stream::new(service, "log", Urgency::Report)
+}
+/// What every service of a robot logs, or of all of them: for subscribers only.
+#[must_use]
+pub fn every_log(robot: Option<&RobotId>) -> Key<LogLine> {
+    log_of("*").key(robot.map_or("*", RobotId::as_str))
+}
+/// What the service `service` worked from.
+#[must_use]
+pub const fn trace(service: &'static str) -> Stream<Trace> {
+    Stream::new(service, "trace", Urgency::Report)
+}
+/// What Pathfinder was asked and answered.
+pub const PLAN_ANSWERED: Stream<Answered<PlanAsk, Plan>> =
+    Stream::new("pathfinder", "answered", Urgency::Report);
+/// What Pathdriver was asked and answered.
+pub const DRIVE_ANSWERED: Stream<Answered<DriveAsk, Drive>> =
+    Stream::new("pathdriver", "answered", Urgency::Report);
+
 /// There and back again: the streams of `axle bench mesh`.
 pub const BENCH: (Stream<NavigatorData>, Stream<NavigatorData>) =
     (Stream::new("bench", "there", Urgency::Control), Stream::new("bench", "back", Urgency::Control));
@@ -310,63 +384,11 @@ pub const ANY_CORRECTOR: &str = "<corrector>";
 /// Stands for the name of any motor or encoder service in [`TABLE`].
 pub const ANY_MOTOR: &str = "<motor>";
 
-/// All keys, in the order of the way of a task.
-pub const TABLE: &[Entry] = &[
-    GO.entry("Take a task: plan it and drive it."),
-    GO_CANCEL.entry("End a task before its time."),
-    GO_PROGRESS.entry("How far the task is."),
-    GO_WAY.entry("The task that was taken."),
-    GO_PLAN.entry("Pathfinder's answer for the task."),
-    GO_DRIVE.entry("Pathdriver's answer for the task."),
-    PLAN.entry("Turn way points into geometries."),
-    DRIVE.entry("Turn geometries into movements."),
-    corrector_task::<Drive>(ANY_CORRECTOR)
-        .entry("A task for a corrector: movements (d, ltv), or a plan, `PlanTask` (all others)."),
-    corrector_cancel(ANY_CORRECTOR).entry("End a corrector's task before its time."),
-    corrector_progress(ANY_CORRECTOR).entry("What the corrector does at every beat: due against real."),
-    LEASE.entry("Get the right to command the wheels."),
-    RELEASE.entry("Give it back."),
-    COMMAND.entry("A movement for the wheels, now."),
-    STOP.entry("Stop the wheels at once; latches."),
-    ENABLE.entry("Allow the wheels to move after a stop or a boot."),
-    GATE_STATE.entry("What the gate does, and why."),
-    DRIVE_ALL_STOP.entry("Contract: stop, take the power from the wheels, disable."),
-    DRIVE_ENABLE.entry("Contract: enable or disable the drive."),
-    DRIVE_POWER.entry("Contract: set the powers of both wheels."),
-    DRIVE_SPEED.entry("Contract: set the speeds of both wheels."),
-    DRIVE_DISTANCE.entry("Contract: drive straight by a distance."),
-    DRIVE_ROTATE.entry("Contract: turn on the spot by an angle."),
-    DRIVE_RESET.entry("Contract: set the encoders of the drive to zero."),
-    DRIVE_GET.entry("Contract: the state of the drive."),
-    DRIVE_UPDATE.entry("Contract: the state of the drive, on change."),
-    DRIVE_DISTANCE_STAGE.entry("Contract: a distance was started, completed or cancelled."),
-    DRIVE_ROTATE_STAGE.entry("Contract: a turn was started, completed or cancelled."),
-    motor_power(ANY_MOTOR).entry("The power of one motor."),
-    motor_reading(ANY_MOTOR).entry("What one motor or encoder measures."),
-    ENCODERS.entry("Distance of each wheel since boot."),
-    INERTIAL.entry("Turn rate and accelerations."),
-    FIX.entry("An absolute position."),
-    SIGNALS.entry("Duty cycles of the motors."),
-    TRUTH.entry("Where an emulated robot really is."),
-    RECENT.entry("The newest measurements, as correctors and the navigator read them."),
-    WINDOW.entry("Older measurements."),
-    POSE.entry("Where the robot believes to be."),
-];
+/// Stands for the name of any service in [`TABLE`].
+pub const ANY_SERVICE: &str = "<service>";
 
 /// The name of a schema, and how to show what it describes.
 type Reader = (fn() -> String, ToJson);
-
-/// Message types that may stand in an encoding, beside those of [`TABLE`].
-const MORE_TYPES: &[Reader] = &[
-    (schema_of::<Dwm>, json::<Dwm>),
-    (schema_of::<Plan>, json::<Plan>),
-    (schema_of::<Drive>, json::<Drive>),
-    (schema_of::<Lease>, json::<Lease>),
-    (schema_of::<Status>, json::<Status>),
-    (schema_of::<StatusAsk>, json::<StatusAsk>),
-    (schema_of::<DriveStopped>, json::<DriveStopped>),
-    (schema_of::<OperationBegun>, json::<OperationBegun>),
-];
 
 /// What a key is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -387,6 +409,15 @@ pub fn place(key: &str) -> Option<Place<'_>> {
     (root == ROOT && chunks.next().is_none()).then_some(Place { robot, service, name })
 }
 
+/// A key of this shape for another robot; others stay as they are.
+#[must_use]
+pub fn moved(key: &str, robot: &RobotId) -> String {
+    match place(key) {
+        Some(Place { service, name, .. }) => format!("{ROOT}/{robot}/{service}/{name}"),
+        None => key.to_owned(),
+    }
+}
+
 /// The line of the table that describes a concrete key.
 #[must_use]
 pub fn find(key: &str) -> Option<&'static Entry> {
@@ -394,13 +425,27 @@ pub fn find(key: &str) -> Option<&'static Entry> {
     find_port(place.service, place.name)
 }
 
+/// The line of the table that describes the last two chunks of a key, for example `navigator/pose`.
+#[must_use]
+pub fn find_stream(port: &str) -> Option<&'static Entry> {
+    let (service, name) = port.split_once('/')?;
+    find_port(service, name)
+}
+
 fn find_port(service: &str, name: &str) -> Option<&'static Entry> {
     TABLE.iter().find(|entry| {
         let corrector = entry.service == ANY_CORRECTOR && service.ends_with("-corrector");
         let is_motor = service.starts_with("motor-") || service.starts_with("encoder-");
         let motor = entry.service == ANY_MOTOR && is_motor;
-        (corrector || motor || entry.service == service) && entry.name == name
+        let any = corrector || motor || entry.service == ANY_SERVICE;
+        (any || entry.service == service) && entry.name == name
     })
+}
+
+/// Whether this program reads samples of this schema, for example `axle.Dwm.v1`.
+#[must_use]
+pub fn knows(schema: &str) -> bool {
+    readers().any(|(name, _)| name() == schema)
 }
 
 /// Decodes a sample into JSON by the schema that its encoding names, or else by its key.
@@ -410,12 +455,7 @@ fn find_port(service: &str, name: &str) -> Option<&'static Entry> {
 pub fn to_json(key: &str, encoding: &str, bytes: &[u8]) -> Result<serde_json::Value, Refusal> {
     let named = encoding.split_once(';').map(|(_, schema)| schema).filter(|schema| !schema.is_empty());
     let reader = match named {
-        Some(schema) => TABLE
-            .iter()
-            .map(|entry| (entry.carries, entry.json))
-            .chain(MORE_TYPES.iter().copied())
-            .find(|(name, _)| name() == schema)
-            .map(|(_, reader)| reader),
+        Some(schema) => readers().find(|(name, _)| name() == schema).map(|(_, reader)| reader),
         None => find(key).map(|entry| entry.json),
     };
     let Some(reader) = reader else {
@@ -454,6 +494,13 @@ impl Presence {
         let Self { robot, service, boot, .. } = self;
         format!("{ROOT}/{robot}/@status/{service}/{boot}")
     }
+    /// The key at which the process is told how much to log.
+    #[must_use]
+    pub fn log_level(&self) -> Key<SetLog> {
+        let Self { robot, service, boot, .. } = self;
+        let text = format!("{ROOT}/{robot}/@log/{service}/{boot}");
+        Key { text, urgency: Urgency::Report, carries: PhantomData }
+    }
     /// Every token.
     #[must_use]
     pub fn every_token() -> String {
@@ -464,7 +511,7 @@ impl Presence {
     pub fn every_status() -> String {
         format!("{ROOT}/*/@status/**")
     }
-    /// The tokens of one service.
+    /// The tokens of one service; the robot may be `*`.
     #[must_use]
     pub fn tokens_of(robot: &str, service: &str) -> String {
         format!("{ROOT}/{robot}/@alive/{service}/**")

@@ -44,7 +44,6 @@ mod tables;
 pub use reckon::{accelerated, arc, chord, half_turn, point_and_shoot, slope};
 pub use shape::{Shape, shape};
 
-use double_double::DoubleDouble;
 use stretch::Stretch;
 
 /// State of the robot at one instant of a movement, in the frame of its start.
@@ -113,8 +112,7 @@ impl Wheels {
         }
         let time = if t < 0.0 { 0.0 } else { t };
         if self.is_tame(time) {
-            let share = DoubleDouble::quotient(time, self.duration);
-            return Stretch::part(self.speeds(), share, time, self.track).motion();
+            return Stretch::until(self.speeds(), time, self.duration, self.track).motion();
         }
         scale::motion(self, time)
     }

@@ -41,13 +41,54 @@ pub struct Status {
     /// The keys it listens to.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub hears: Vec<String>,
+    /// What it has published, by key.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub said: Vec<Flow>,
+    /// What has arrived at it, by key, before anybody looked at it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub heard: Vec<Flow>,
+    /// Its wall time when it answers, since 1970: for comparing clocks.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wall: Option<Seconds>,
+    /// The certificate that it shows, if it has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub certificate: Option<Shown>,
+}
+
+/// The samples of one key since a process began.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Flow {
+    /// The key.
+    pub key: String,
+    /// How many there were.
+    pub count: u64,
+    /// How many of them could not be read.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub refused: u64,
+    /// Why the latest of those could not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub why: Option<String>,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for it")]
+const fn is_none(count: &u64) -> bool {
+    *count == 0
+}
+
+/// A certificate as its owner shows it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Shown {
+    /// Its owner.
+    pub name: String,
+    /// When it ends, since 1970.
+    pub expires: Seconds,
 }
 
 /// The most keys of either kind that a status lists.
 pub const MAX_KEYS: usize = 64;
 impl Message for Status {
     const NAME: &'static str = "Status";
-    const LIMIT: usize = 16 * 1024;
+    const LIMIT: usize = 64 * 1024;
     fn check(&self) -> Result<(), Refusal> {
         for (what, text) in [
             ("service", &self.service),
@@ -58,7 +99,9 @@ impl Message for Status {
             limit_list(&format!("letters of {what}"), text.len(), 128)?;
         }
         limit_list("keys that a process says", self.says.len(), MAX_KEYS)?;
-        limit_list("keys that a process hears", self.hears.len(), MAX_KEYS)
+        limit_list("keys that a process hears", self.hears.len(), MAX_KEYS)?;
+        limit_list("flows that a process says", self.said.len(), MAX_KEYS)?;
+        limit_list("flows that a process hears", self.heard.len(), MAX_KEYS)
     }
 }
 

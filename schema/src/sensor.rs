@@ -14,7 +14,7 @@ pub struct InertialData {
     /// Turn rate about the vertical axis, counter-clockwise positive: the mean since the reading before, so that the
     /// readings sum up to the turn.
     pub gyro: RadiansPerSecond,
-    /// Acceleration forward, where it is measured.
+    /// Acceleration forward, where it is measured: the mean since the reading before.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ax: Option<MetresPerSecondSquared>,
     /// Acceleration to the left, where it is measured.
@@ -48,6 +48,21 @@ pub struct HeadingFix {
     pub variance: f64,
 }
 
+/// The distance to a known point, such as an ultra-wideband anchor.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Range {
+    /// Seconds since the boot of the robot process.
+    pub stamp: Seconds,
+    /// The point's position along x, in `map`.
+    pub x: Metres,
+    /// The point's position along y, in `map`.
+    pub y: Metres,
+    /// How far it is from the middle of the axle.
+    pub distance: Metres,
+    /// Standard deviation of the distance, above 0.
+    pub sd: Metres,
+}
+
 /// The duty cycles of both motors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Signals {
@@ -69,6 +84,13 @@ impl Message for Fix {
         within("variance of y", self.covariance.0[3], 0.0, f64::MAX)?;
         self.heading
             .map_or(Ok(()), |heading| within("variance of the heading", heading.variance, 0.0, f64::MAX))
+    }
+}
+impl Message for Range {
+    const NAME: &'static str = "Range";
+    const LIMIT: usize = 256;
+    fn check(&self) -> Result<(), Refusal> {
+        within("sd of the distance in m", self.sd.0, 1e-9, 1e9)
     }
 }
 impl Message for Signals {

@@ -25,6 +25,10 @@ impl<T> Sides<T> {
     pub fn zip<U, V>(self, other: Sides<U>, mut f: impl FnMut(T, U) -> V) -> Sides<V> {
         Sides { left: f(self.left, other.left), right: f(self.right, other.right) }
     }
+    /// References to both.
+    pub const fn as_ref(&self) -> Sides<&T> {
+        Sides { left: &self.left, right: &self.right }
+    }
     /// Both, left first.
     pub fn both(self) -> [T; 2] {
         [self.left, self.right]

@@ -112,6 +112,9 @@ pub struct GoAsk {
     /// Which corrector drives; left out, the pilot's own choice.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub corrector: Option<String>,
+    /// The numbers, from 1, of the way points at which the robot waits until a person confirms that it may drive on.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub confirm: Vec<u32>,
 }
 impl Message for GoAsk {
     const NAME: &'static str = "GoAsk";
@@ -120,7 +123,10 @@ impl Message for GoAsk {
         if let Some(name) = &self.corrector {
             crate::plan::limit_list("letters of a corrector's name", name.len(), 64)?;
         }
-        self.way.check()
+        crate::plan::limit_list("way points to confirm", self.confirm.len(), crate::way::MAX_POINTS)?;
+        self.way.check()?;
+        let last = self.way.points.len() as f64;
+        self.confirm.iter().try_for_each(|&point| within("way point to confirm", f64::from(point), 1.0, last))
     }
 }
 
@@ -155,6 +161,9 @@ pub struct PilotProgress {
     pub fraction: f64,
     /// Time since the task was accepted, by the pilot's clock.
     pub elapsed: Seconds,
+    /// For whom or what the robot stands, in a sentence; none while it drives.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub waiting: Option<String>,
 }
 impl Message for PilotProgress {
     const NAME: &'static str = "PilotProgress";

@@ -130,6 +130,8 @@ units! {
     MetresPerSecondSquared " m/s²";
     /// A curvature, to the left positive: the inverse of a signed radius.
     PerMetre " 1/m";
+    /// A number without a unit.
+    Ratio "";
 }
 
 impl Div<Seconds> for Metres {
@@ -222,6 +224,11 @@ impl<'de> Deserialize<'de> for Duty {
 /// A list of finite numbers of fixed length, such as the nine entries of a covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Numbers<const N: usize>(pub [f64; N]);
+impl<const N: usize> Default for Numbers<N> {
+    fn default() -> Self {
+        Self([0.0; N])
+    }
+}
 
 impl<const N: usize> Serialize for Numbers<N> {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {

@@ -1,21 +1,28 @@
 //! One value and more of every message: what the golden files hold.
 
+mod board;
+mod calibration;
 mod differential_drive;
+mod fleet;
+mod log;
+mod navigator;
+mod trace;
 
 use super::golden::Golden;
 use axle_schema::command::{
     AllStop, BrakeCause, Class, Command, Done, Enable, GateState, Lease, LeaseAsk, Motion, Reject, Release,
 };
 use axle_schema::meta::{Cause, Meta};
-use axle_schema::presence::{Status, StatusAsk};
+use axle_schema::presence::{Flow, Shown, Status, StatusAsk};
 use axle_schema::task::{Accepted, Cancel, CorrectorProgress, GoAsk, Phase, PilotProgress};
 use axle_schema::window::{Window, WindowAsk};
 use axle_schema::{
     Boot, Drive, DriveAsk, Drivetrain, Duty, Dwm, EncodersData, EncodersSpan, Fix, Geometry, HeadingFix,
-    InertialData, Leg, Metres, MetresPerSecond, MetresPerSecondSquared, NavigatorData, NavigatorSpan,
-    Numbers, Plan, PlanAsk, Pose, Radians, RadiansPerSecond, Refusal, Seconds, Sides, Signals, StopId, Task,
-    TaskId, Tick, Twist, WayPoint, WayTask,
+    InertialData, Leg, MapAsk, MapData, Metres, MetresPerSecond, MetresPerSecondSquared, NavigatorData,
+    NavigatorSpan, Numbers, Plan, PlanAsk, PlanProgress, PlanStrategy, Pose, Radians, RadiansPerSecond,
+    Refusal, Seconds, Sides, Signals, StopId, Task, TaskId, Tick, Twist, WayPoint, WayTask,
 };
+pub(super) use navigator::position;
 
 /// Every example of every type.
 pub(super) fn all() -> Vec<Golden> {
@@ -25,8 +32,14 @@ pub(super) fn all() -> Vec<Golden> {
     correctors(&mut all);
     gate(&mut all);
     differential_drive::examples(&mut all);
+    fleet::examples(&mut all);
+    board::examples(&mut all);
+    calibration::examples(&mut all);
     measurements(&mut all);
+    trace::examples(&mut all);
+    navigator::examples(&mut all);
     processes(&mut all);
+    log::examples(&mut all);
     refusals(&mut all);
     all
 }
@@ -61,6 +74,7 @@ pub(super) fn plan() -> Plan {
         ],
         length: Metres(1.1),
         notes: vec!["way point 3 repeats way point 2".into()],
+        ..Plan::default()
     }
 }
 
@@ -69,16 +83,20 @@ pub(super) fn drive() -> Drive {
         dwms: vec![dwm(), Dwm::rest(Seconds(0.1))],
         counts: vec![2],
         jump: MetresPerSecond(0.5),
+        offset: None,
         duration: Seconds(0.15),
     }
 }
 
 fn tasks(all: &mut Vec<Golden>) {
     all.push(Golden::new("", way()));
-    all.push(Golden::new("", GoAsk { way: way(), corrector: Some("d-corrector".into()) }));
+    all.push(Golden::new(
+        "",
+        GoAsk { way: way(), corrector: Some("d-corrector".into()), confirm: Vec::new() },
+    ));
     all.push(Golden::new(
         "short",
-        GoAsk { way: WayTask { points: vec![WayPoint::at(1.0, 0.0)] }, corrector: None },
+        GoAsk { way: WayTask { points: vec![WayPoint::at(1.0, 0.0)] }, corrector: None, confirm: Vec::new() },
     ));
     all.push(Golden::new("", Accepted { task: TaskId(77) }));
     all.push(Golden::new("", Cancel { id: TaskId((1 << 53) - 1) }));
@@ -91,14 +109,61 @@ fn tasks(all: &mut Vec<Golden>) {
         distance_left: Metres(0.4),
         fraction: 0.5,
         elapsed: Seconds(2.25),
+        waiting: None,
     };
     all.push(Golden::new("", progress.clone()));
     let failed = Phase::Failed(Refusal::Unreachable { why: "a wall".into() });
     all.push(Golden::new("failed", PilotProgress { phase: failed, ..progress }));
 }
 
+fn maps(all: &mut Vec<Golden>) {
+    let map = MapData {
+        name: "warehouse".into(),
+        resolution: Metres(0.05),
+        origin: Pose::new(-1.0, -2.5, 0.25),
+        width: 4,
+        height: 2,
+        content: (1 << 53) - 1,
+        runs: vec![0, 5, 100, 2, 255, 1],
+    };
+    all.push(Golden::new(
+        "whole",
+        PlanAsk {
+            way: way(),
+            start: None,
+            strategy: Some(PlanStrategy::Map),
+            reorder: true,
+            map: Some(map.clone()),
+            robot: Some(Drivetrain::default()),
+            body: Some(Metres(0.25)),
+            deadline: Some(Seconds(1.5)),
+            id: Some(TaskId(77)),
+        },
+    ));
+    all.push(Golden::new(
+        "whole",
+        Plan {
+            strategy: Some(PlanStrategy::TurnAndGo),
+            time: Some(Seconds(4.5)),
+            clearance: Some(Metres(0.125)),
+            order: vec![1, 0],
+            ..plan()
+        },
+    ));
+    all.push(Golden::new("", MapAsk { have: Some(7) }));
+    all.push(Golden::new("short", MapAsk { have: None }));
+    all.push(Golden::new("", map.clone()));
+    all.push(Golden::new("known", MapData { runs: vec![], ..map }));
+    let elapsed = Seconds(0.75);
+    all.push(Golden::new("", PlanProgress { id: TaskId(77), fraction: 0.5, elapsed }));
+}
+
 fn plans(all: &mut Vec<Golden>) {
-    all.push(Golden::new("", PlanAsk { way: way(), start: Some(Pose::new(0.5, -0.25, 3.0)) }));
+    all.push(Golden::new(
+        "",
+        PlanAsk { way: way(), start: Some(Pose::new(0.5, -0.25, 3.0)), ..PlanAsk::default() },
+    ));
+    maps(all);
     all.push(Golden::new("", plan()));
     all.push(Golden::new("empty", Plan::default()));
     all.push(Golden::new(
@@ -107,9 +172,10 @@ fn plans(all: &mut Vec<Golden>) {
             legs: plan().legs,
             speeds: Some(Sides::new(MetresPerSecond(0.1), MetresPerSecond(0.2))),
             robot: Some(Drivetrain::default()),
+            manner: None,
         },
     ));
-    all.push(Golden::new("short", DriveAsk { legs: plan().legs, speeds: None, robot: None }));
+    all.push(Golden::new("short", DriveAsk { legs: plan().legs, speeds: None, robot: None, manner: None }));
     all.push(Golden::new("", drive()));
     all.push(Golden::new("", dwm()));
 }
@@ -153,9 +219,15 @@ fn gate(all: &mut Vec<Golden>) {
     all.push(Golden::new("", Release { boot: Boot(7), epoch: 3 }));
     all.push(Golden::new("", command()));
     all.push(Golden::new("", AllStop { id: StopId(9), by: "a person at the laptop".into() }));
-    let enable =
-        Enable { stop: Some(StopId(9)), boot: Boot(7), echo: Tick(123_456), by: "axle enable".into() };
+    let enable = Enable {
+        stop: Some(StopId(9)),
+        boot: Boot(7),
+        echo: Tick(123_456),
+        by: "axle enable".into(),
+        class: Class::Manual,
+    };
     all.push(Golden::new("", enable.clone()));
+    all.push(Golden::new("program", Enable { class: Class::Corrector, ..enable.clone() }));
     all.push(Golden::new("boot", Enable { stop: None, ..enable }));
     all.push(Golden::new("", Done {}));
     gate_states(all);
@@ -241,7 +313,9 @@ fn measurements(all: &mut Vec<Golden>) {
             encoders: vec![encoders],
             inertial: vec![inertial],
             fixes: vec![fix],
+            ranges: vec![navigator::range()],
             dropped: 2,
+            position: Some(position()),
         },
     ));
     all.push(Golden::new("empty", Window { boot: Boot(7), ..Window::default() }));
@@ -274,7 +348,20 @@ fn processes(all: &mut Vec<Golden>) {
         refused: 2,
         says: vec!["a key".into()],
         hears: vec!["another key".into(), "a third key".into()],
+        said: vec![],
+        heard: vec![],
+        wall: None,
+        certificate: None,
     };
+    let flow = Flow { key: "another key".into(), count: 12, refused: 1, why: Some("a reason".into()) };
+    let flows = Status {
+        said: vec![Flow { refused: 0, why: None, ..flow.clone() }],
+        heard: vec![flow],
+        wall: Some(Seconds(1.75e9)),
+        certificate: Some(Shown { name: "d-corrector@r1".into(), expires: Seconds(1.8e9) }),
+        ..status.clone()
+    };
+    all.push(Golden::new("flows", flows));
     all.push(Golden::new("", status.clone()));
     all.push(Golden::new("short", Status { says: vec![], hears: vec![], ..status }));
     all.push(Golden::new("", StatusAsk {}));

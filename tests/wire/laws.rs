@@ -8,7 +8,8 @@ use axle_schema::window::{MAX_WINDOW, Window};
 use axle_schema::{
     Boot, Drive, DriveAsk, Dwm, EncodersData, Fix, Geometry, HeadingFix, InertialData, Leg, Message, Metres,
     MetresPerSecond, MetresPerSecondSquared, NavigatorData, Numbers, Plan, PlanAsk, Pose, Radians,
-    RadiansPerSecond, Refusal, Seconds, Sides, Task, TaskId, Tick, Twist, WayPoint, WayTask, decode, encode,
+    RadiansPerSecond, Range, Refusal, Seconds, Sides, Task, TaskId, Tick, Twist, WayPoint, WayTask, decode,
+    encode,
 };
 use proptest::prelude::*;
 use std::fmt::Debug;
@@ -152,12 +153,12 @@ proptest! {
         id in any::<u64>(),
         speeds in proptest::option::of(speeds()),
     ) {
-        let plan = Plan { start, legs: legs.clone(), length: Metres(start.x.0), notes };
+        let plan = Plan { start, legs: legs.clone(), length: Metres(start.x.0), notes, ..Plan::default() };
         comes_back(&plan)?;
         comes_back(&Task { id: TaskId(id), plan })?;
-        comes_back(&DriveAsk { legs, speeds, robot: None })?;
+        comes_back(&DriveAsk { legs, speeds, robot: None, manner: None })?;
         let (jump, duration) = (MetresPerSecond(0.0), Seconds(1.0));
-        comes_back(&Drive { dwms, counts: vec![3, 2, 1], jump, duration })?;
+        comes_back(&Drive { dwms, counts: vec![3, 2, 1], jump, offset: None, duration })?;
     }
 }
 
@@ -174,20 +175,36 @@ fn the_longest_lists_fit_into_their_messages() {
     let (heading, speed) = (Some(Radians(LONG)), Some(MetresPerSecond(LONG)));
     let way = WayTask { points: vec![WayPoint { heading, speed, ..WayPoint::at(LONG, LONG) }; MAX_POINTS] };
     fits(&way);
-    fits(&PlanAsk { way: way.clone(), start: Some(Pose::new(LONG, LONG, LONG)) });
-    fits(&axle_schema::task::GoAsk { way: way.clone(), corrector: Some("x".repeat(64)) });
+    fits(&PlanAsk { way: way.clone(), start: Some(Pose::new(LONG, LONG, LONG)), ..PlanAsk::default() });
+    fits(&axle_schema::task::GoAsk {
+        way: way.clone(),
+        corrector: Some("x".repeat(64)),
+        confirm: Vec::new(),
+    });
     fits(&Task { id: TaskId(u64::MAX), plan: way });
     let geometry = Geometry::Arc { radius: Metres(LONG), angle: Radians(LONG) };
     let legs = vec![Leg { geometry, point: u32::MAX, speed }; axle_schema::plan::MAX_LEGS];
     let notes = vec!["n".repeat(400); axle_schema::plan::MAX_NOTES];
-    let plan = Plan { start: Pose::new(LONG, LONG, LONG), legs: legs.clone(), length: Metres(LONG), notes };
+    let plan = Plan {
+        start: Pose::new(LONG, LONG, LONG),
+        legs: legs.clone(),
+        length: Metres(LONG),
+        notes,
+        ..Plan::default()
+    };
     fits(&plan);
     fits(&Task { id: TaskId(u64::MAX), plan });
-    fits(&DriveAsk { legs, speeds: None, robot: Some(axle_schema::Drivetrain::default()) });
+    fits(&DriveAsk { legs, speeds: None, robot: Some(axle_schema::Drivetrain::default()), manner: None });
     let speeds = Sides::new(MetresPerSecond(LONG), MetresPerSecond(LONG));
     let dwms = vec![Dwm::steady(speeds, Seconds(LONG)).expect("finite"); axle_schema::plan::MAX_DWMS];
     let counts = vec![u32::MAX; axle_schema::plan::MAX_LEGS];
-    let drive = Drive { dwms, counts, jump: MetresPerSecond(LONG), duration: Seconds(LONG) };
+    let drive = Drive {
+        dwms,
+        counts,
+        jump: MetresPerSecond(LONG),
+        offset: Some(Metres(LONG)),
+        duration: Seconds(LONG),
+    };
     fits(&drive);
     fits(&Task { id: TaskId(u64::MAX), plan: drive });
 }
@@ -210,6 +227,8 @@ fn the_fullest_window_fits() {
             MAX_WINDOW
         ],
         fixes: vec![Fix { stamp, x, y, covariance: Numbers([LONG; 4]), heading }; MAX_WINDOW],
+        ranges: vec![Range { stamp, x, y, distance: x, sd: x }; MAX_WINDOW],
         dropped: u64::MAX,
+        position: Some(examples::position()),
     });
 }

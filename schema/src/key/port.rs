@@ -1,8 +1,8 @@
 //! The last two chunks of a key, without the robot: what a service offers or needs, whoever it works for.
 
-use super::{Call, Entry, Stream, TABLE};
-use crate::Refusal;
+use super::{Call, Entry, ROOT, Stream, TABLE};
 use crate::codec::Message;
+use crate::{Refusal, RobotId};
 use std::fmt;
 
 /// One end of a wire: a stream or a call of a service, for example `navigator/pose`.
@@ -33,6 +33,11 @@ impl Port {
             got: text.chars().take(64).collect(),
             known: ports.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "),
         })
+    }
+    /// The key of one robot, or of every robot: for access rules and for looking at what was heard.
+    #[must_use]
+    pub fn key(self, robot: Option<&RobotId>) -> String {
+        format!("{ROOT}/{}/{self}", robot.map_or("*", RobotId::as_str))
     }
     /// Its line of the table.
     #[must_use]

@@ -9,21 +9,93 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+/// What the two parts are: a number, or two of them side by side.
+pub(super) trait Part:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+{
+    /// The same number everywhere.
+    fn all(number: f64) -> Self;
+    /// `self·b + c`, rounded once.
+    fn fused(self, b: Self, c: Self) -> Self;
+}
+
+impl Part for f64 {
+    #[inline]
+    fn all(number: f64) -> Self {
+        number
+    }
+    #[inline]
+    fn fused(self, b: Self, c: Self) -> Self {
+        self.mul_add(b, c)
+    }
+}
+
+/// Two numbers to which the same is done: the processor does it to both at once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Two(pub(super) f64, pub(super) f64);
+
+impl Part for Two {
+    #[inline]
+    fn all(number: f64) -> Self {
+        Self(number, number)
+    }
+    #[inline]
+    fn fused(self, b: Self, c: Self) -> Self {
+        Self(self.0.mul_add(b.0, c.0), self.1.mul_add(b.1, c.1))
+    }
+}
+impl Add for Two {
+    type Output = Self;
+    #[inline]
+    fn add(self, other: Self) -> Self {
+        Self(self.0 + other.0, self.1 + other.1)
+    }
+}
+impl Sub for Two {
+    type Output = Self;
+    #[inline]
+    fn sub(self, other: Self) -> Self {
+        Self(self.0 - other.0, self.1 - other.1)
+    }
+}
+impl Mul for Two {
+    type Output = Self;
+    #[inline]
+    fn mul(self, other: Self) -> Self {
+        Self(self.0 * other.0, self.1 * other.1)
+    }
+}
+impl Div for Two {
+    type Output = Self;
+    #[inline]
+    fn div(self, other: Self) -> Self {
+        Self(self.0 / other.0, self.1 / other.1)
+    }
+}
+impl Neg for Two {
+    type Output = Self;
+    #[inline]
+    fn neg(self) -> Self {
+        Self(-self.0, -self.1)
+    }
+}
+
 /// `hi + lo`, with `hi` the nearest `f64` to the sum.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct DoubleDouble {
+pub(super) struct DoubleDouble<T = f64> {
     /// The value rounded to `f64`.
-    pub(super) hi: f64,
+    pub(super) hi: T,
     /// What the rounding took away.
-    pub(super) lo: f64,
+    pub(super) lo: T,
 }
 
 /// Whether the target multiplies and adds in one instruction. Without it `mul_add` is a slow library call.
 const FUSED: bool = cfg!(any(target_feature = "fma", target_arch = "aarch64"));
 
-impl DoubleDouble {
+impl<T: Part> DoubleDouble<T> {
     /// `a + b`, exactly (Knuth's `2Sum`).
-    pub(super) fn sum(a: f64, b: f64) -> Self {
+    #[inline]
+    pub(super) fn sum(a: T, b: T) -> Self {
         let hi = a + b;
         let of_b = hi - a;
         let of_a = hi - of_b;
@@ -31,43 +103,68 @@ impl DoubleDouble {
     }
 
     /// `a + b`, exactly, provided that `|a| ≥ |b|` or `a == 0` (Dekker's `Fast2Sum`).
-    pub(super) fn ordered_sum(a: f64, b: f64) -> Self {
+    #[inline]
+    pub(super) fn ordered_sum(a: T, b: T) -> Self {
         let hi = a + b;
         Self { hi, lo: b - (hi - a) }
     }
 
     /// `a·b`, exactly; both ways give the same bits.
-    pub(super) fn product(a: f64, b: f64) -> Self {
+    #[inline]
+    pub(super) fn product(a: T, b: T) -> Self {
         let hi = a * b;
         if FUSED {
-            return Self { hi, lo: a.mul_add(b, -hi) };
+            return Self { hi, lo: a.fused(b, -hi) };
         }
         let (a_hi, a_lo) = split(a);
         let (b_hi, b_lo) = split(b);
         Self { hi, lo: ((a_hi * b_hi - hi) + a_hi * b_lo + a_lo * b_hi) + a_lo * b_lo }
     }
 
-    /// `a/b`, with a relative error below 3u².
-    pub(super) fn quotient(a: f64, b: f64) -> Self {
-        Self { hi: a, lo: 0.0 } / b
+    /// `a/b`, with a relative error below 3.5u².
+    #[inline]
+    pub(super) fn quotient(a: T, b: T) -> Self {
+        Self { hi: a, lo: T::all(0.0) } / b
     }
 
     /// Twice the number, exactly.
+    #[inline]
     pub(super) fn doubled(self) -> Self {
-        Self { hi: 2.0 * self.hi, lo: 2.0 * self.lo }
+        let two = T::all(2.0);
+        Self { hi: two * self.hi, lo: two * self.lo }
+    }
+}
+
+impl DoubleDouble<Two> {
+    /// Two numbers side by side.
+    #[inline]
+    pub(super) fn both(first: DoubleDouble, second: DoubleDouble) -> Self {
+        Self { hi: Two(first.hi, second.hi), lo: Two(first.lo, second.lo) }
+    }
+    /// The first of them.
+    #[inline]
+    pub(super) fn first(self) -> DoubleDouble {
+        DoubleDouble { hi: self.hi.0, lo: self.lo.0 }
+    }
+    /// The second of them.
+    #[inline]
+    pub(super) fn second(self) -> DoubleDouble {
+        DoubleDouble { hi: self.hi.1, lo: self.lo.1 }
     }
 }
 
 /// The upper 26 bits of `a`, and the rest, so that products of parts are exact (Veltkamp).
-fn split(a: f64) -> (f64, f64) {
-    let scaled = 134_217_729.0 * a; // 2²⁷ + 1
+#[inline]
+fn split<T: Part>(a: T) -> (T, T) {
+    let scaled = T::all(134_217_729.0) * a; // 2²⁷ + 1
     let hi = scaled - (scaled - a);
     (hi, a - hi)
 }
 
 /// Relative error below 3u² + 13u³, whatever cancels (`AccurateDWPlusDW`).
-impl Add for DoubleDouble {
+impl<T: Part> Add for DoubleDouble<T> {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         let high = Self::sum(self.hi, other.hi);
         let low = Self::sum(self.lo, other.lo);
@@ -76,24 +173,27 @@ impl Add for DoubleDouble {
     }
 }
 
-impl Neg for DoubleDouble {
+impl<T: Part> Neg for DoubleDouble<T> {
     type Output = Self;
+    #[inline]
     fn neg(self) -> Self {
         Self { hi: -self.hi, lo: -self.lo }
     }
 }
 
-impl Sub for DoubleDouble {
+impl<T: Part> Sub for DoubleDouble<T> {
     type Output = Self;
+    #[inline]
     fn sub(self, other: Self) -> Self {
         self + -other
     }
 }
 
 /// Relative error below 2u² (`DWTimesFP1`).
-impl Mul<f64> for DoubleDouble {
+impl<T: Part> Mul<T> for DoubleDouble<T> {
     type Output = Self;
-    fn mul(self, other: f64) -> Self {
+    #[inline]
+    fn mul(self, other: T) -> Self {
         let high = Self::product(self.hi, other);
         let first = Self::ordered_sum(high.hi, self.lo * other);
         Self::ordered_sum(first.hi, first.lo + high.lo)
@@ -101,8 +201,9 @@ impl Mul<f64> for DoubleDouble {
 }
 
 /// Relative error below 7u² (`DWTimesDW1`).
-impl Mul for DoubleDouble {
+impl<T: Part> Mul for DoubleDouble<T> {
     type Output = Self;
+    #[inline]
     fn mul(self, other: Self) -> Self {
         let high = Self::product(self.hi, other.hi);
         Self::ordered_sum(high.hi, high.lo + (self.hi * other.lo + self.lo * other.hi))
@@ -110,9 +211,10 @@ impl Mul for DoubleDouble {
 }
 
 /// Relative error below 3.5u² (`DWDivFP3`).
-impl Div<f64> for DoubleDouble {
+impl<T: Part> Div<T> for DoubleDouble<T> {
     type Output = Self;
-    fn div(self, other: f64) -> Self {
+    #[inline]
+    fn div(self, other: T) -> Self {
         let hi = self.hi / other;
         let back = Self::product(hi, other);
         // Both differences are exact: `back` lies within an ulp of `self.hi`.
@@ -122,8 +224,9 @@ impl Div<f64> for DoubleDouble {
 }
 
 /// Relative error below 15u² + 56u³ (`DWDivDW2`).
-impl Div for DoubleDouble {
+impl<T: Part> Div for DoubleDouble<T> {
     type Output = Self;
+    #[inline]
     fn div(self, other: Self) -> Self {
         let hi = self.hi / other.hi;
         let back = other * hi;

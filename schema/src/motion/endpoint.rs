@@ -38,16 +38,17 @@ pub(super) fn displacement(stretch: &Stretch, theta: DoubleDouble) -> Complex {
     let mirror = if mirrored { -1.0 } else { 1.0 };
     let theta = if mirrored { -theta } else { theta };
     let rates = Rates::of(stretch);
-    let start = End::new(stretch.v0, mirror * stretch.omega_start(), &rates);
-    let end = End::new(stretch.v1, mirror * stretch.omega_end(), &rates);
+    let start = End::new(stretch.v0, mirror * stretch.n0.hi, stretch.track, &rates);
+    let end = End::new(stretch.v1, mirror * stretch.n1.hi, stretch.track, &rates);
 
     let mut z = Complex::direction(theta) * end.antiderivative(&rates) - start.antiderivative(&rates);
-    if !(start.is_far() && end.is_far() && start.omega * end.omega > 0.0) {
+    if !(start.is_far() && end.is_far() && start.slowness * end.slowness > 0.0) {
         // The ends are at the times u0 and u1 since the inflection; in parts of the duration, u/t = n/m.
         let u0 = stretch.n0 / stretch.m;
         let u1 = stretch.n1.hi / stretch.m.hi;
         // θ* = −φ0 = −C·u0² = −(u0/t)·n0·t/(2Δ); no square of a speed is formed that could underflow.
-        let phi0 = u0 * stretch.n0 * (mirror * stretch.time) / (2.0 * stretch.track);
+        let phi0 = u0 * stretch.n0 * stretch.turn;
+        let phi0 = if mirrored { -phi0 } else { phi0 };
         let phi1 = theta + phi0;
         // Vc = v − A·u loses least at the end that is nearer to the inflection.
         let gain = stretch.v1 - stretch.v0;
@@ -74,7 +75,7 @@ impl Rates {
         let gain = stretch.v1 - stretch.v0;
         Self {
             a: gain / stretch.time,
-            twist: stretch.m.hi.abs() / stretch.track / stretch.time,
+            twist: stretch.m.hi.abs() / (stretch.track * stretch.time),
             radius: gain * stretch.track / stretch.m.hi.abs(),
         }
     }
@@ -84,15 +85,18 @@ impl Rates {
 struct End {
     /// Speed of the robot's centre, in m/s.
     v: f64,
-    /// Turning rate, in rad/s.
-    omega: f64,
+    /// `1/ω`, the time in which the robot turns by a radian, in s/rad; infinite at the inflection. Of the divisions that
+    /// the formulas have, it is the only one that is left.
+    slowness: f64,
     /// `2C/ω² = 1/(2φ)`: 0 on a circle, infinite at the inflection.
     nearness: f64,
 }
 
 impl End {
-    fn new(v: f64, omega: f64, rates: &Rates) -> Self {
-        Self { v, omega, nearness: rates.twist / (omega * omega) }
+    /// The end where the centre has the speed `v`, and the right wheel is faster than the left one by `n`.
+    fn new(v: f64, n: f64, track: f64, rates: &Rates) -> Self {
+        let slowness = track / n;
+        Self { v, slowness, nearness: rates.twist * slowness * slowness }
     }
 
     fn is_far(&self) -> bool {
@@ -107,8 +111,8 @@ impl End {
         }
         let sigma = polynomial(&FAR, 4.0 * PHI_FAR * self.nearness - 1.0);
         let rho = Complex { re: sigma.im * self.nearness, im: -sigma.re * self.nearness };
-        let radius = self.v / self.omega;
-        let growth = rates.a / self.omega / self.omega;
+        let radius = self.v * self.slowness;
+        let growth = rates.a * self.slowness * self.slowness;
         Complex { re: radius * rho.im + growth * sigma.re, im: growth * sigma.im - radius * (1.0 + rho.re) }
     }
 
@@ -119,7 +123,7 @@ impl End {
     /// displacement.
     fn fresnel(&self, phi: f64, u: f64, rates: &Rates) -> Complex {
         if self.is_far() {
-            let part = (PI / rates.twist).sqrt().copysign(self.omega) / 2.0;
+            let part = (PI / rates.twist).sqrt().copysign(self.slowness) / 2.0;
             return Complex { re: part, im: part };
         }
         // The limits matter only beyond some 1e30 rad, where the sum that gave `phi` has no digits left.
@@ -131,15 +135,16 @@ impl End {
 
 /// Two real polynomials at the same point, as one complex number.
 ///
-/// Even and odd powers are summed apart: a plain Horner scheme of this length would wait for one addition
-/// after the other.
+/// Every fourth power is summed apart: a plain Horner scheme of this length would wait for one addition after the other.
 fn polynomial<const N: usize>(rows: &[[f64; 2]; N], z: f64) -> Complex {
     let square = z * z;
-    let mut sums = [[0.0; 2]; 2];
+    let fourth = square * square;
+    let mut sums = [[0.0; 2]; 4];
     for (k, row) in rows.iter().enumerate().rev() {
-        let sum = &mut sums[k % 2];
-        *sum = [sum[0] * square + row[0], sum[1] * square + row[1]];
+        let sum = &mut sums[k % 4];
+        *sum = [sum[0] * fourth + row[0], sum[1] * fourth + row[1]];
     }
-    let [even, odd] = sums;
-    Complex { re: even[0] + z * odd[0], im: even[1] + z * odd[1] }
+    let [a, b, c, d] = sums;
+    let part = |k: usize| (a[k] + z * b[k]) + square * (c[k] + z * d[k]);
+    Complex { re: part(0), im: part(1) }
 }

@@ -2,7 +2,7 @@
 
 use super::Motion;
 use super::complex::Complex;
-use super::double_double::DoubleDouble;
+use super::double_double::{DoubleDouble, Two};
 use super::{endpoint, quadrature};
 
 /// A movement of wheels at constant acceleration, from its start to its end.
@@ -22,6 +22,11 @@ pub(super) struct Stretch {
     pub(super) n1: DoubleDouble,
     /// `n1 − n0`, in m/s.
     pub(super) m: DoubleDouble,
+    /// `n0 + n1`, in m/s: twice the mean.
+    both: DoubleDouble,
+    /// `time/(2·track)`, in s/m: how far the robot turns for each m/s of `both`. It is ready before `both` is, and to
+    /// multiply by it takes half as long as to divide by the track.
+    pub(super) turn: DoubleDouble,
     /// How long it lasts, in seconds.
     pub(super) time: f64,
     /// Distance between the wheels, in metres.
@@ -33,27 +38,56 @@ impl Stretch {
     /// end.
     pub(super) fn whole(speeds: [f64; 4], time: f64, track: f64) -> Self {
         let [v0l, v0r, v1l, v1r] = speeds;
-        let n0 = DoubleDouble::sum(v0r, -v0l);
-        let n1 = DoubleDouble::sum(v1r, -v1l);
-        Self { v0: (v0l + v0r) / 2.0, v1: (v1l + v1r) / 2.0, n0, n1, m: n1 - n0, time, track }
+        let n = DoubleDouble::sum(Two(v0r, v1r), -Two(v0l, v1l));
+        let (n0, n1) = (n.first(), n.second());
+        // n1 − n0 and n1 + n0, side by side.
+        let sums = DoubleDouble::both(n1, n1) + DoubleDouble::both(-n0, n0);
+        Self {
+            v0: (v0l + v0r) / 2.0,
+            v1: (v1l + v1r) / 2.0,
+            n0,
+            n1,
+            m: sums.first(),
+            both: sums.second(),
+            turn: DoubleDouble::quotient(time, 2.0 * track),
+            time,
+            track,
+        }
     }
 
     /// The first `share` (from 0 to 1) of a movement, which takes the time `time`.
     pub(super) fn part(speeds: [f64; 4], share: DoubleDouble, time: f64, track: f64) -> Self {
-        let [v0l, v0r, v1l, v1r] = speeds;
-        let start = DoubleDouble::sum(v0l, v0r);
-        let end = DoubleDouble::sum(v1l, v1r);
-        // In double-double, because the speed may cross zero near this instant and should keep its digits
-        // there.
-        let now = start + (end - start) * share;
-        let n0 = DoubleDouble::sum(v0r, -v0l);
-        let m = (DoubleDouble::sum(v1r, -v1l) - n0) * share;
-        Self { v0: start.hi / 2.0, v1: now.hi / 2.0, n0, n1: n0 + m, m, time, track }
+        Self::shared(speeds, share, DoubleDouble::quotient(time, 2.0 * track), time, track)
     }
 
-    /// Turning rate at the start, in rad/s.
-    pub(super) fn omega_start(&self) -> f64 {
-        self.n0.hi / self.track
+    /// What of a movement of `duration` is over after `time`.
+    pub(super) fn until(speeds: [f64; 4], time: f64, duration: f64, track: f64) -> Self {
+        // Two quotients take no longer than one.
+        let quotients = DoubleDouble::quotient(Two(time, time), Two(duration, 2.0 * track));
+        Self::shared(speeds, quotients.first(), quotients.second(), time, track)
+    }
+
+    fn shared(speeds: [f64; 4], share: DoubleDouble, turn: DoubleDouble, time: f64, track: f64) -> Self {
+        let [v0l, v0r, v1l, v1r] = speeds;
+        // The sum and the difference of the wheels, side by side. In double-double, because either may cross zero near
+        // this instant and should keep its digits there.
+        let start = DoubleDouble::sum(Two(v0r, v0r), Two(v0l, -v0l));
+        let end = DoubleDouble::sum(Two(v1r, v1r), Two(v1l, -v1l));
+        let gain = (end - start) * DoubleDouble::both(share, share);
+        let now = start + gain;
+        let (n0, m) = (start.second(), gain.second());
+        Self {
+            v0: start.hi.0 / 2.0,
+            v1: now.hi.0 / 2.0,
+            n0,
+            n1: now.second(),
+            m,
+            // The sum n0 + n1, written so that it need not wait for n1.
+            both: n0.doubled() + m,
+            turn,
+            time,
+            track,
+        }
     }
 
     /// Turning rate at the end, in rad/s.
@@ -64,11 +98,10 @@ impl Stretch {
     /// Where the stretch ends, in the frame of its start.
     pub(super) fn motion(&self) -> Motion {
         let omega = self.omega_end();
-        // The sum n0 + n1, written so that it need not wait for n1.
-        let theta = (self.n0.doubled() + self.m) * self.time / (2.0 * self.track);
+        let theta = self.both * self.turn;
         // Bounds the total variation of the heading, which may be far more than |θ| when the robot swings
         // back.
-        let phase = (self.omega_start().abs() + omega.abs()) * self.time / 2.0;
+        let phase = (self.n0.hi.abs() + self.n1.hi.abs()) * self.turn.hi;
         let z = if phase == 0.0 {
             Complex { re: (self.v0 + self.v1) / 2.0 * self.time, im: 0.0 }
         } else if phase <= quadrature::PHASE_LIMIT {

@@ -41,6 +41,44 @@ pub(super) const RIPPLES: Waves<6, 6> = Waves {
     ],
 };
 
+/// Sine and cosine for `|x| ≤ 0.27`: one more term. Truncation error below 1e-17. Each row is a coefficient of the sine and
+/// one of the cosine, since they are wanted of one angle.
+pub(super) const SWELL: [[f64; 2]; 7] = [
+    [1.0, 1.0],
+    [-0.16666666666666666, -0.5],
+    [0.008333333333333333, 0.041666666666666664],
+    [-0.0001984126984126984, -0.001388888888888889],
+    [2.7557319223985893e-06, 2.48015873015873e-05],
+    [-2.505210838544172e-08, -2.755731922398589e-07],
+    [1.6059043836821613e-10, 2.08767569878681e-09],
+];
+
+/// Sine and cosine for `|x| ≤ 1.6`: nearly minimax. Truncation error below 5e-17.
+pub(super) const ROLLERS: Waves<9, 9> = Waves {
+    sin: [
+        1.0,
+        -0.16666666666666666,
+        0.008333333333333144,
+        -0.00019841269841193673,
+        2.755731920867262e-06,
+        -2.5052106655519892e-08,
+        1.6058928978557088e-10,
+        -7.642714421438495e-13,
+        2.7182632792857447e-15,
+    ],
+    cos: [
+        1.0,
+        -0.49999999999999967,
+        0.04166666666666307,
+        -0.001388888888874459,
+        2.480158727257423e-05,
+        -2.7557315946039396e-07,
+        2.0876539311134135e-09,
+        -1.1462310961053394e-11,
+        4.6027072507821317e-14,
+    ],
+};
+
 /// Sine and cosine for `|x| ≤ π`: nearly minimax. Truncation error below 2e-16.
 pub(super) const WAVES: Waves<11, 12> = Waves {
     sin: [
@@ -178,7 +216,7 @@ pub(super) const GAUSS_16: Rule<8> = Rule {
 
 #[cfg(test)]
 mod tests {
-    use super::{FAR, GAUSS_8, GAUSS_12, GAUSS_16, NEAR, RIPPLES, Rule, WAVES, Waves};
+    use super::{FAR, GAUSS_8, GAUSS_12, GAUSS_16, NEAR, RIPPLES, ROLLERS, Rule, SWELL, WAVES, Waves};
     use std::f64::consts::PI;
 
     fn horner(coefficients: impl DoubleEndedIterator<Item = f64>, x: f64) -> f64 {
@@ -232,6 +270,8 @@ mod tests {
             }
         }
         check(&RIPPLES, 0.2, 1.2e-16);
+        check(&Waves { sin: SWELL.map(|row| row[0]), cos: SWELL.map(|row| row[1]) }, 0.27, 1.8e-16);
+        check(&ROLLERS, 1.6, 4e-16);
         check(&WAVES, PI, 8e-16);
     }
 
