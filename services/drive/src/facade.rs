@@ -407,7 +407,7 @@ impl<C: Corrector<Plan = Drive>> Facade<C> {
         let echo = newest.filter(|tick| tick.since(state.tick) > 0).unwrap_or(state.tick);
         let (boot, by) = (state.boot, self.name.clone());
         self.enabling += 1;
-        self.outs.push(Out::Enable(ticket, Enable { stop, boot, echo, by }));
+        self.outs.push(Out::Enable(ticket, Enable { stop, boot, echo, by, class: Class::Manual }));
         Ok(None)
     }
 

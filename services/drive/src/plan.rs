@@ -38,7 +38,7 @@ pub(crate) fn plan(stages: &Stages, params: &DriveParams) -> Result<Option<Drive
     dwms.push(Dwm::new(fast, rest, Seconds(v / a))?);
     let counts = dwms.iter().map(|_| 1).collect();
     let duration = dwms.iter().map(Dwm::duration).sum();
-    Ok(Some(Drive { dwms, counts, jump: MetresPerSecond::ZERO, duration }))
+    Ok(Some(Drive { dwms, counts, jump: MetresPerSecond::ZERO, duration, ..Drive::default() }))
 }
 
 /// The speeds after moving from `from` toward `target`, where no wheel changes by more than `change`. Both wheels go

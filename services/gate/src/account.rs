@@ -50,6 +50,12 @@ impl Gate {
         }
     }
 
+    /// The number of the lease in force.
+    #[must_use]
+    pub fn leased(&self) -> Option<u32> {
+        self.held.as_ref().map(|_| self.epoch)
+    }
+
     /// What the wheels are doing.
     #[must_use]
     pub fn motion(&self) -> Motion {

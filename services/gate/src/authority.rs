@@ -1,18 +1,15 @@
 //! Who may move the wheels: leases, AllStop and enable.
 
 use crate::Gate;
-use crate::gate::{Held, Permit};
+use crate::gate::{Held, Permit, SILENT_PERIODS};
 use axle_schema::codec::Message;
-use axle_schema::command::{BrakeCause, Enable, Lease, LeaseAsk, Release};
+use axle_schema::command::{BrakeCause, Class, Enable, Lease, LeaseAsk, Release};
 use axle_schema::{Boot, Refusal, Seconds, StopId, Tick};
-
-/// Periods of silence after which the wheels brake (fault model, 3.5: 2.5 periods, within 150 to 500 ms).
-const SILENT_PERIODS: f64 = 2.5;
 
 impl Gate {
     /// Gives somebody the right to command the wheels. A higher class takes it at once, an equal or lower one never;
     /// the holder itself may ask again, and gets a new epoch. Every grant starts from braking wheels: what an older
-    /// epoch commanded ends with it. Commands renew the lease.
+    /// epoch commanded ends with it. Commands renew the lease; the first one may take longer than the others.
     ///
     /// # Errors
     /// [`Refusal::Disabled`], [`Refusal::Busy`] with the name of the holder, and what [`LeaseAsk`] may not be.
@@ -82,8 +79,15 @@ impl Gate {
     /// # Errors
     /// [`Refusal::Fenced`] unless it quotes this boot, the latest stop (or none, where there was none) and an echo
     /// that is no older than a command's: so neither a delayed nor a replayed enable ends a stop.
+    /// [`Refusal::OutOfRange`] for a program: a person lets a robot move again.
     pub fn enable(&mut self, now: Seconds, enable: &Enable) -> Result<(), Refusal> {
         let now = self.settle(now);
+        enable.check()?;
+        if enable.class < Class::Manual {
+            let class = format!("{:?}", enable.class).to_lowercase();
+            let limit = "manual or above: a person lets a robot move again, no program does";
+            return Err(Refusal::out_of_range("class of an enable", class, limit));
+        }
         self.same_boot(enable.boot)?;
         if enable.stop != self.stop {
             let why =
@@ -145,7 +149,7 @@ mod tests {
     use crate::GateParams;
     use crate::rig::{BOOT, Rig, ask, drive};
     use axle_schema::Drivetrain;
-    use axle_schema::command::{Class, Motion, Reject};
+    use axle_schema::command::{Motion, Reject};
 
     const STOP: StopId = StopId(7);
 
@@ -236,7 +240,13 @@ mod tests {
         let mut rig = Rig::enabled();
         rig.now = Seconds(5.0);
         rig.gate.stop(rig.now, STOP);
-        let fine = Enable { stop: Some(STOP), boot: BOOT, echo: Tick(4900), by: "a person".into() };
+        let fine = Enable {
+            stop: Some(STOP),
+            boot: BOOT,
+            echo: Tick(4900),
+            by: "a person".into(),
+            class: Class::Manual,
+        };
         let wrong = [
             Enable { stop: None, ..fine.clone() },
             Enable { stop: Some(StopId(6)), ..fine.clone() },
@@ -246,6 +256,15 @@ mod tests {
         ];
         for enable in wrong {
             assert!(matches!(rig.gate.enable(rig.now, &enable), Err(Refusal::Fenced { .. })), "{enable:?}");
+            assert_eq!(rig.gate.latch(), Some(STOP));
+        }
+        for enable in [
+            Enable { class: Class::Corrector, ..fine.clone() },
+            Enable { class: Class::Background, ..fine.clone() },
+            Enable { by: "x".repeat(97), ..fine.clone() },
+        ] {
+            let refused = rig.gate.enable(rig.now, &enable);
+            assert!(refused.is_err_and(|refusal| !matches!(refusal, Refusal::Fenced { .. })), "{enable:?}");
             assert_eq!(rig.gate.latch(), Some(STOP));
         }
         rig.gate.enable(rig.now, &fine).expect("enabled");
@@ -260,7 +279,8 @@ mod tests {
         let robot = Drivetrain::default();
         let mut gate = Gate::new(GateParams::default(), &robot, BOOT, None).expect("a gate");
         assert!(gate.lease(Seconds(1.0), &ask("a", Class::Manual)).is_err());
-        let enable = Enable { stop: None, boot: BOOT, echo: Tick(900), by: "a person".into() };
+        let enable =
+            Enable { stop: None, boot: BOOT, echo: Tick(900), by: "a person".into(), class: Class::Manual };
         gate.enable(Seconds(1.0), &enable).expect("enabled");
         assert!(gate.lease(Seconds(1.0), &ask("a", Class::Manual)).is_ok());
     }

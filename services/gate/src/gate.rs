@@ -78,6 +78,9 @@ pub(crate) struct Course {
     pub(crate) lasts: Seconds,
 }
 
+/// Periods of silence after which the wheels brake (fault model, 3.5: 2.5 periods, within 150 to 500 ms).
+pub(crate) const SILENT_PERIODS: f64 = 2.5;
+
 impl Gate {
     /// The gate of a robot after a boot, with standing wheels and without a holder.
     ///
@@ -160,11 +163,22 @@ impl Gate {
     /// A clock that goes backwards stands still for the gate, and one that is no number runs: so timers run out.
     pub(crate) fn settle(&mut self, now: Seconds) -> Seconds {
         self.now = if now.is_finite() { self.now.max(now) } else { self.now + MAX_BEAT };
-        let alive = |held: &Held| self.now < held.heard + held.silence_stop;
+        let alive = |held: &Held| self.now < held.heard + self.patience(held.silence_stop);
         if self.held.as_ref().is_some_and(|held| !alive(held)) {
             self.end_lease(BrakeCause::Silence);
         }
         self.now
+    }
+
+    /// For how long a holder may be silent whose lease says `silence_stop`.
+    ///
+    /// The first command may take longer, for its way is longer: the grant has to reach the holder, and from there the
+    /// command comes back after the next beat. On a link over which commands can be obeyed at all, both ways together
+    /// take at most `max_age`. Nothing moves in that time: after a grant the wheels brake or rest until the first
+    /// command.
+    fn patience(&self, silence_stop: Seconds) -> Seconds {
+        let period = silence_stop * (1.0 / SILENT_PERIODS);
+        if self.seq.is_some() { silence_stop } else { silence_stop.max(self.params.max_age + period) }
     }
 
     /// Ends the lease and the movement that it gave; the beats brake from now on.
@@ -199,8 +213,8 @@ impl Course {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rig::{Rig, drive};
-    use axle_schema::command::Motion;
+    use crate::rig::{Rig, ask, drive};
+    use axle_schema::command::{Command, LeaseAsk, Motion};
 
     #[test]
     fn a_movement_runs_from_its_acceptance_and_brakes_when_no_next_one_comes() {
@@ -253,6 +267,41 @@ mod tests {
     }
 
     #[test]
+    fn the_first_command_may_take_as_long_as_its_way_and_that_of_the_grant() {
+        // 250 ms for both ways, and a period of 60 ms at most between them.
+        for (waits, obeyed) in [(0.3, true), (0.305, true), (0.32, false)] {
+            let mut rig = Rig::enabled();
+            let lease = rig.lease("a", Class::Corrector);
+            assert_eq!(rig.beats(waits), Sides::default(), "nothing moves by a grant");
+            assert_eq!(rig.command(&lease, drive(0.0, 0.1, 1.0)).is_ok(), obeyed, "after {waits} s");
+            // From then on silence is what the lease says.
+            rig.beats(0.145);
+            assert_eq!(rig.gate.held.is_some(), obeyed, "after {waits} s");
+            rig.beats(0.01);
+            assert_eq!(rig.gate.held, None);
+        }
+        let ask = LeaseAsk { period: Seconds(0.2), ..ask("a", Class::Corrector) };
+        let mut rig = Rig::enabled();
+        rig.gate.lease(rig.now, &ask).expect("a lease");
+        rig.beats(0.49);
+        assert!(rig.gate.held.is_some(), "500 ms are enough for anybody");
+        rig.beats(0.02);
+        assert_eq!(rig.gate.held, None);
+    }
+
+    #[test]
+    fn a_grant_over_moving_wheels_brakes_them_however_long_the_first_command_takes() {
+        let mut rig = Rig::enabled();
+        let lease = rig.lease("a", Class::Corrector);
+        rig.command(&lease, drive(0.5, 0.5, 10.0)).expect("obeyed");
+        assert!(rig.beats(0.14).left.0 > 0.3);
+        rig.lease("m", Class::Manual);
+        let before = rig.gate.wheels.left.0;
+        let after = rig.beats(0.1).left.0;
+        assert!((before - after - 0.2).abs() < 1e-9, "2 m/s² from the grant on: {before} to {after}");
+    }
+
+    #[test]
     fn a_command_during_braking_resumes_smoothly() {
         let mut rig = Rig::enabled();
         let lease = rig.lease("a", Class::Corrector);
@@ -293,6 +342,24 @@ mod tests {
         }
         assert!(steepest <= 2.5 + 1e-9 && speeds.iter().copied().fold(0.0, f64::max) > 0.2);
         assert_eq!((gate.motion(), speeds[240]), (Motion::Standing, 0.0));
+    }
+
+    #[test]
+    fn a_clock_that_jumps_ahead_brakes_and_one_that_jumps_back_stands_still() {
+        let mut rig = Rig::enabled();
+        let lease = rig.lease("a", Class::Corrector);
+        rig.command(&lease, drive(0.5, 0.5, 5.0)).expect("obeyed");
+        let speed = rig.beats(0.14).left;
+        let waiting = rig.next(&lease, drive(0.5, 0.5, 5.0));
+        let back = rig.gate.beat(rig.now - Seconds(10.0));
+        assert_eq!((back.left, rig.gate.motion()), (speed, Motion::Driving), "no time has passed");
+        rig.now += Seconds(3600.0);
+        let ahead = rig.gate.beat(rig.now).left;
+        assert!((speed - ahead).0 <= 2.0 * MAX_BEAT.0 + 1e-12 && ahead < speed, "{speed} to {ahead}");
+        assert_eq!(rig.gate.state(rig.now).cause, Some(BrakeCause::Silence));
+        let lease = rig.lease("a", Class::Corrector);
+        let waiting = Command { epoch: lease.epoch, ..waiting };
+        assert_eq!(rig.gate.obey(rig.now, &waiting), Err(Reject::Stale), "what was said before the jump");
     }
 
     #[test]

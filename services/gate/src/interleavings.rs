@@ -14,6 +14,10 @@ const DEPTH: usize = 8;
 /// From beat to beat, s: a sum of powers of two, so that times add up exactly.
 const BEAT: f64 = 0.0625;
 
+/// Silence that ends a lease, before its first command and after it, s.
+const FIRST: f64 = 0.25 + 0.06;
+const SILENCE: f64 = 0.15;
+
 /// Two correctors, a person, and what a person at a distance does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Move {
@@ -52,6 +56,8 @@ struct World {
     leases: [Option<Lease>; 3],
     holder: Option<usize>,
     heard: Seconds,
+    /// For how long the holder may be silent: until the first command longer.
+    patience: f64,
     stopped: bool,
     seq: u32,
     /// The latest command of each.
@@ -59,7 +65,7 @@ struct World {
 }
 
 /// Everything of a world that its future depends on: times as they are by now, and of an epoch whether it is the latest.
-type Essence = (bool, Option<(usize, i64)>, Option<(i64, i64)>, [i64; 2], [Option<bool>; 3], [bool; 3]);
+type Essence = (bool, Option<(usize, i64, bool)>, Option<(i64, i64)>, [i64; 2], [Option<bool>; 3], [bool; 3]);
 
 /// A number as a whole one, so that rounding makes no new worlds.
 fn grain(number: f64) -> i64 {
@@ -70,9 +76,7 @@ fn grain(number: f64) -> i64 {
 
 impl World {
     fn makes(&mut self, next: Move) {
-        if self.holder.is_some() && self.now.0 - self.heard.0 >= 0.15 {
-            self.holder = None;
-        }
+        self.waits();
         match next {
             Move::Asks(who) => {
                 let may = !self.stopped
@@ -80,7 +84,8 @@ impl World {
                 let outcome = self.gate.step(self.now, &Event::Lease(ask(&format!("h{who}"), CLASSES[who])));
                 assert_eq!(matches!(outcome, Outcome::Granted(_)), may, "{next:?}: {outcome:?}");
                 if let Outcome::Granted(lease) = outcome {
-                    (self.leases[who], self.holder, self.heard) = (Some(lease), Some(who), self.now);
+                    (self.leases[who], self.holder) = (Some(lease), Some(who));
+                    (self.heard, self.patience) = (self.now, FIRST);
                 }
             }
             Move::Drives(who) => {
@@ -90,7 +95,7 @@ impl World {
                 let obeyed = outcome == Outcome::Done;
                 assert_eq!(obeyed, self.holder == Some(who), "{next:?}: {outcome:?}");
                 if obeyed {
-                    self.heard = self.now;
+                    (self.heard, self.patience) = (self.now, SILENCE);
                 } else {
                     let why = [Reject::Fenced, Reject::Disabled].map(Outcome::Rejected);
                     assert!(why.contains(&outcome), "{next:?}: {outcome:?}");
@@ -118,7 +123,13 @@ impl World {
             }
             Move::Enable => {
                 let stop = self.gate.state(self.now).stop;
-                let enable = Enable { stop, boot: BOOT, echo: Tick::of(self.now), by: "a test".into() };
+                let enable = Enable {
+                    stop,
+                    boot: BOOT,
+                    echo: Tick::of(self.now),
+                    by: "a test".into(),
+                    class: Class::Manual,
+                };
                 assert_eq!(self.gate.step(self.now, &Event::Enable(enable)), Outcome::Done);
                 self.stopped = false;
             }
@@ -127,12 +138,15 @@ impl World {
                 let before = self.gate.wheels;
                 self.gate.step(self.now, &Event::Beat);
                 self.keeps_limits(before);
-                if self.holder.is_some() && self.now.0 - self.heard.0 >= 0.15 {
-                    self.holder = None;
-                }
+                self.waits();
             }
         }
         self.agrees(next);
+    }
+
+    /// The holder who has been silent for too long is none any more.
+    fn waits(&mut self) {
+        self.holder = self.holder.filter(|_| self.now.0 - self.heard.0 < self.patience);
     }
 
     /// The next command of somebody who has, or had, a lease.
@@ -163,7 +177,7 @@ impl World {
     fn essence(&self) -> Essence {
         let held = self.gate.held.as_ref().map(|held| {
             let who = self.holder.expect("the observer agrees");
-            (who, grain((self.now - held.heard).0))
+            (who, grain((self.now - held.heard).0), self.gate.seq.is_some())
         });
         let course = self
             .gate
@@ -193,6 +207,7 @@ fn world() -> World {
         leases: [None; 3],
         holder: None,
         heard: Seconds::ZERO,
+        patience: FIRST,
         stopped: false,
         seq: 0,
         said: [None; 3],

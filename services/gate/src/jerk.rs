@@ -67,8 +67,11 @@ impl Setpoint {
         // A limit that has become smaller is come down to at the same pace.
         let most = steepest.max(self.acceleration.abs() - jerk * h);
         let wanted = (self.acceleration + change * h).clamp(-most, most);
-        // A wheel that still gains speed must come out of its acceleration below its largest speed.
-        let room = (2.0 * jerk * (fastest - speed.abs()).max(0.0)).sqrt();
+        // A wheel that still gains speed must come out of its acceleration below its largest speed: with the acceleration a
+        // it gains a² / (2 jerk) + a h / 2 until then, in steps of h. With the longest h the bound holds for all others,
+        // and it never falls faster than by the jerk.
+        let (left, h) = ((fastest - speed.abs()).max(0.0), h.max(STEP));
+        let room = jerk * ((h * h / 4.0 + 2.0 * left / jerk).sqrt() - h / 2.0);
         let acceleration = if wanted * speed > 0.0 { wanted.clamp(-room, room) } else { wanted };
         Self { acceleration, ..next }
     }

@@ -116,8 +116,13 @@ impl History {
             }
             Act::Enable { stop_back } => {
                 let quoted = self.stop.map(|StopId(id)| StopId(id - stop_back));
-                let enable =
-                    Enable { stop: quoted, boot: BOOT, echo: Tick::of(self.now), by: "a test".into() };
+                let enable = Enable {
+                    stop: quoted,
+                    boot: BOOT,
+                    echo: Tick::of(self.now),
+                    by: "a test".into(),
+                    class: Class::Manual,
+                };
                 let result = self.gate.enable(self.now, &enable);
                 assert_eq!(result.is_ok(), quoted == self.stop, "it must quote the latest stop");
                 if result.is_ok() {

@@ -11,6 +11,7 @@
 //!
 //! * one holder at a time: every grant has a new epoch, and commands of older epochs are fenced;
 //! * a command proves by its echo of the robot's own clock that it is younger than `max_age`;
+//! * a grant moves nothing: until its first command the wheels brake or rest, for as long as that may take;
 //! * silence, the end of a movement, a lost lease and AllStop all end in the same bounded braking to standstill;
 //! * no setpoint differs from the one before by more than the acceleration limit allows, and, where it is set, the
 //!   jerk limit;

@@ -4,7 +4,7 @@
 //! sequence numbers of the publisher are counted as losses, and a late sample that fills a gap is taken off again.
 
 use axle_schema::meta::Meta;
-use axle_schema::{Boot, EncodersData, Fix, InertialData, Seconds};
+use axle_schema::{Boot, EncodersData, Fix, InertialData, Range, Seconds};
 use std::collections::VecDeque;
 
 /// A measurement at a stamp of the robot's clock.
@@ -37,6 +37,18 @@ impl Stamped for Fix {
     }
     fn repeats(&self, other: &Self) -> bool {
         // Two beacons may be seen in the same picture.
+        self == other
+    }
+}
+
+impl Stamped for Range {
+    /// As a fix, it may be thought about for a while.
+    const RESTART: f64 = 10.0;
+    fn stamp(&self) -> Seconds {
+        self.stamp
+    }
+    fn repeats(&self, other: &Self) -> bool {
+        // Several points may answer at once.
         self == other
     }
 }

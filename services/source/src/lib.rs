@@ -2,7 +2,8 @@
 //!
 //! Hears every measurement of one robot, keeps the newest of each kind in the order of their stamps, and says windows
 //! of them: the last fifth of a second again and again, and older ones when asked (paper, section II: Source "plays
-//! the role of a buffer for the measurements"). All times are of the robot's clock; Source has none of its own.
+//! the role of a buffer for the measurements"). All times are of the robot's clock; Source has none of its own. It also
+//! keeps the newest position that the navigator has said, so that a navigator that starts anew goes on from there.
 //!
 //! When something fails: a lost sample is counted, a repeated or broken one is dropped, and when the robot restarts
 //! everything of its former run is forgotten, since its stamps mean nothing any more.
@@ -11,7 +12,7 @@ use axle_schema::contract::{Bounds, Params};
 use axle_schema::meta::Meta;
 use axle_schema::refusal::within;
 use axle_schema::window::{MAX_WINDOW, Window, WindowAsk};
-use axle_schema::{Boot, EncodersData, Fix, InertialData, Message, Refusal, Seconds};
+use axle_schema::{Boot, EncodersData, Fix, InertialData, Message, Position, Range, Refusal, Seconds};
 use serde::{Deserialize, Serialize};
 
 mod buffer;
@@ -27,21 +28,26 @@ pub struct SourceParams {
     pub inertial: usize,
     /// How many of the newest absolute positions are kept, 1 to 4096.
     pub fixes: usize,
+    /// How many of the newest distances to known points are kept, 1 to 4096.
+    pub ranges: usize,
     /// How much of the newest measurements is said without being asked, 0.001 to 60 s.
     pub recent: Seconds,
 }
 
 impl Default for SourceParams {
     fn default() -> Self {
-        Self { encoders: 2048, inertial: 2048, fixes: 256, recent: Seconds(0.2) }
+        Self { encoders: 2048, inertial: 2048, fixes: 256, ranges: 1024, recent: Seconds(0.2) }
     }
 }
 
 impl Bounds for SourceParams {
     fn check(&self) -> Result<(), Refusal> {
-        for (name, capacity) in
-            [("encoders", self.encoders), ("inertial", self.inertial), ("fixes", self.fixes)]
-        {
+        for (name, capacity) in [
+            ("encoders", self.encoders),
+            ("inertial", self.inertial),
+            ("fixes", self.fixes),
+            ("ranges", self.ranges),
+        ] {
             if !(1..=MAX_WINDOW).contains(&capacity) {
                 return Err(Refusal::out_of_range(name, capacity, format!("1 to {MAX_WINDOW}")));
             }
@@ -63,6 +69,8 @@ pub struct Source {
     encoders: Buffer<EncodersData>,
     inertial: Buffer<InertialData>,
     fixes: Buffer<Fix>,
+    ranges: Buffer<Range>,
+    position: Option<Position>,
 }
 
 impl Source {
@@ -78,6 +86,8 @@ impl Source {
             encoders: Buffer::new(params.encoders),
             inertial: Buffer::new(params.inertial),
             fixes: Buffer::new(params.fixes),
+            ranges: Buffer::new(params.ranges),
+            position: None,
         })
     }
 
@@ -100,6 +110,9 @@ impl Source {
             if source.is_none() || self.fixes.source != source {
                 self.fixes.clear();
             }
+            if source.is_none() || self.ranges.source != source {
+                self.ranges.clear();
+            }
         }
         self.boot = source.unwrap_or(self.boot);
         self.encoders.insert(meta, datum);
@@ -119,10 +132,25 @@ impl Source {
         }
     }
 
+    /// Takes a distance to a known point; as a fix.
+    pub fn take_range(&mut self, meta: Option<Meta>, datum: Range) {
+        if datum.check().is_ok() && datum.x.is_finite() && datum.y.is_finite() && datum.distance.is_finite() {
+            take(&mut self.ranges, meta, datum);
+        }
+    }
+
+    /// Takes what the navigator says of the robot. It says in which run of the robot it is.
+    pub fn take_position(&mut self, position: Position) {
+        if position.check().is_ok() {
+            self.position = Some(position);
+        }
+    }
+
     /// The measurements of the last `span` before the newest one, oldest first.
     #[must_use]
     pub fn recent(&self, span: Seconds) -> Window {
-        let newest = [self.encoders.newest(), self.inertial.newest(), self.fixes.newest()];
+        let newest =
+            [self.encoders.newest(), self.inertial.newest(), self.fixes.newest(), self.ranges.newest()];
         let newest =
             newest.into_iter().flatten().fold(f64::NEG_INFINITY, |newest, stamp| newest.max(stamp.0));
         let begin = newest - span.0;
@@ -131,11 +159,11 @@ impl Source {
             encoders: self.encoders.since(begin),
             inertial: self.inertial.since(begin),
             fixes: self.fixes.since(begin),
-            dropped: self
-                .encoders
-                .dropped
-                .saturating_add(self.inertial.dropped)
-                .saturating_add(self.fixes.dropped),
+            ranges: self.ranges.since(begin),
+            dropped: [self.encoders.dropped, self.inertial.dropped, self.fixes.dropped, self.ranges.dropped]
+                .into_iter()
+                .fold(0, u64::saturating_add),
+            position: None,
         }
     }
 
@@ -145,7 +173,9 @@ impl Source {
     /// Refuses a span that is negative or not a number.
     pub fn window(&self, ask: &WindowAsk) -> Result<Window, Refusal> {
         ask.check()?;
-        Ok(self.recent(ask.since.unwrap_or(Seconds(f64::INFINITY))))
+        let window = self.recent(ask.since.unwrap_or(Seconds(f64::INFINITY)));
+        // A position of a former run of the robot tells nothing of this one.
+        Ok(Window { position: self.position.filter(|position| position.boot == self.boot), ..window })
     }
 }
 

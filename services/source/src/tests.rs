@@ -1,7 +1,7 @@
 //! Source, sample by sample.
 
 use super::*;
-use axle_schema::{Metres, MetresPerSecondSquared, Numbers, Radians, RadiansPerSecond};
+use axle_schema::{Metres, MetresPerSecondSquared, Numbers, Pose, Radians, RadiansPerSecond};
 use proptest::prelude::*;
 
 fn source() -> Source {
@@ -129,9 +129,30 @@ fn a_late_fix_is_put_where_it_belongs() {
 }
 
 #[test]
+fn the_newest_position_is_given_to_whoever_asks_in_the_same_run_of_the_robot() {
+    let mut source = source();
+    let position =
+        |boot, x| Position { boot: Boot(boot), map: Pose::new(x, 0.0, 0.0), ..Position::default() };
+    source.take_encoders(meta(1, 0), wheels(0.1));
+    assert_eq!(all(&source).position, None);
+    source.take_position(position(1, 1.0));
+    source.take_position(position(1, 2.0));
+    source.take_position(position(1, f64::NAN));
+    assert_eq!(all(&source).position, Some(position(1, 2.0)));
+    assert_eq!(source.recent(Seconds(1.0)).position, None, "what is said again and again stays small");
+    source.take_encoders(meta(2, 0), wheels(0.1));
+    assert_eq!(all(&source).position, None, "nobody knows where the robot was when it began anew");
+}
+
+#[test]
 fn the_largest_window_may_be_sent() {
-    let params =
-        SourceParams { encoders: MAX_WINDOW, inertial: MAX_WINDOW, fixes: MAX_WINDOW, recent: Seconds(1.0) };
+    let params = SourceParams {
+        encoders: MAX_WINDOW,
+        inertial: MAX_WINDOW,
+        fixes: MAX_WINDOW,
+        ranges: MAX_WINDOW,
+        recent: Seconds(1.0),
+    };
     let mut source = Source::new(&params).expect("valid");
     for n in 0..=MAX_WINDOW {
         #[allow(clippy::cast_precision_loss, reason = "a small number")]
@@ -147,11 +168,13 @@ fn the_largest_window_may_be_sent() {
         );
         let heading = Some(axle_schema::HeadingFix { angle: Radians(odd), variance: odd });
         let covariance = Numbers([odd; 4]);
-        source.take_fix(None, Fix { stamp, x: Metres(odd), y: Metres(odd), covariance, heading });
+        let (x, y) = (Metres(odd), Metres(odd));
+        source.take_fix(None, Fix { stamp, x, y, covariance, heading });
+        source.take_range(None, Range { stamp, x, y, distance: x, sd: x });
     }
     let window = all(&source);
     assert!(window.check().is_ok());
-    assert_eq!(window.fixes.len(), MAX_WINDOW);
+    assert_eq!((window.fixes.len(), window.ranges.len()), (MAX_WINDOW, MAX_WINDOW));
     let size = axle_schema::encode(&window).expect("a window that can be written").len();
     assert!(size < Window::LIMIT, "{size} bytes");
 }
