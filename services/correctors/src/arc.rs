@@ -49,13 +49,14 @@ pub struct ArcParams {
 }
 
 impl Default for ArcParams {
+    /// What the tournament's search found best; the parameter file says by how much.
     fn default() -> Self {
         Self {
             period: Seconds(0.05),
-            lead: Seconds(0.06),
+            lead: Seconds(0.093),
             effort: 0.8,
-            hump: Metres(0.25),
-            sharpening: 3.0,
+            hump: Metres(0.338),
+            sharpening: 3.614,
             aligned: Radians(0.05),
             arrival: Metres(0.03),
             finish: Finish::default(),
@@ -104,6 +105,9 @@ impl Corrector for ArcCorrector {
     }
     fn step(&mut self, seen: &Seen) -> Step {
         self.0.step(seen)
+    }
+    fn resume(&mut self, seen: &Seen, _: Seconds) {
+        self.0.resume(seen);
     }
     fn account(&self) -> Account {
         self.0.account()

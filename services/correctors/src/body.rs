@@ -63,14 +63,8 @@ impl Body {
     /// # Errors
     /// Fails when poses stop, jump or go back in time, and when the robot is blocked.
     pub(crate) fn hear(&mut self, seen: &Seen) -> Result<(), Refusal> {
-        if let (Some((_, newest)), Some(encoders)) = (&mut self.encoders, seen.encoders) {
-            self.grain.take(newest, &encoders);
-            *newest = encoders;
-        }
-        if let Some(before) = self.newest.hear(seen.pose, seen.at)? {
+        if let Some((before, turn)) = self.take(seen)? {
             let value = self.newest.value();
-            let turn = (value.pose.heading - before.pose.heading).wrapped();
-            self.heading += turn;
             let made = ways(before.pose, value.pose, turn, self.robot);
             let (from, to) = (self.counted - self.lead, seen.at - self.lead);
             let asked = self.wheels.covered(from, to);
@@ -79,6 +73,29 @@ impl Body {
             self.stall.count(asked, made, to - from, value.stamp, self.watch.blocked)?;
         }
         Ok(())
+    }
+
+    /// Takes what is seen; says the pose before the newest one, if that is new, and how far the robot has turned since.
+    fn take(&mut self, seen: &Seen) -> Result<Option<(NavigatorData, Radians)>, Refusal> {
+        if let (Some((_, newest)), Some(encoders)) = (&mut self.encoders, seen.encoders) {
+            self.grain.take(newest, &encoders);
+            *newest = encoders;
+        }
+        let before = self.newest.hear(seen.pose, seen.at)?;
+        Ok(before.map(|before| {
+            let turn = (self.newest.value().pose.heading - before.pose.heading).wrapped();
+            self.heading += turn;
+            (before, turn)
+        }))
+    }
+
+    /// The robot has braked without a command: what it did meanwhile tells nothing of how its wheels obey.
+    pub(crate) fn resume(&mut self, seen: &Seen) {
+        // What is wrong with the measurement fails the step that follows.
+        drop(self.take(seen));
+        self.wheels.rest();
+        self.stall = Stall::default();
+        self.counted = seen.at;
     }
 
     /// Where the robot was at the newest measurement.

@@ -19,6 +19,7 @@
 
 use crate::due::Due;
 use crate::grain::Grain;
+use crate::manners::{LATE, Manners, Nearness};
 use crate::newest::{Newest, Watch};
 use axle_schema::contract::{Account, Bounds, Corrector, Params, Seen, Step};
 use axle_schema::refusal::within;
@@ -94,13 +95,14 @@ pub struct DParams {
 }
 
 impl Default for DParams {
+    /// What the tournament's search found best; the parameter file says by how much.
     fn default() -> Self {
         Self {
             period: Seconds(0.05),
             law: Law::default(),
-            pole: 0.7,
+            pole: 0.6,
             gains: Gains::default(),
-            lead: Seconds(0.06),
+            lead: Seconds(0.095),
             tolerance: Metres(0.002),
             settle: Seconds(0.2),
             patience: Seconds(3.0),
@@ -148,6 +150,7 @@ pub struct DCorrector {
     last: Dwm,
     /// The stamp since which both wheels are within the tolerance of the goal.
     calm: Option<Seconds>,
+    manners: Manners,
     /// For the paper's law: the sum of the errors over time, m·s, the last ones, m, and whether a limit held.
     sum: Sides<f64>,
     before: Sides<f64>,
@@ -174,8 +177,22 @@ impl Corrector for DCorrector {
         let (params, begin) = (params.clone(), *newest.value());
         let (zero, calm, nothing) = (None, None, Sides::new(0.0, 0.0));
         let (sum, before, is_limited) = (nothing, nothing, false);
-        let grain = Grain::default();
-        Ok(Self { params, period, due, begin, zero, newest, grain, last, calm, sum, before, is_limited })
+        let (grain, manners) = (Grain::default(), Manners::default());
+        Ok(Self {
+            params,
+            period,
+            due,
+            begin,
+            zero,
+            newest,
+            grain,
+            last,
+            calm,
+            manners,
+            sum,
+            before,
+            is_limited,
+        })
     }
 
     fn step(&mut self, seen: &Seen) -> Step {
@@ -187,6 +204,16 @@ impl Corrector for DCorrector {
             Ok(step) => step,
             Err(refusal) => Step::Fail(refusal),
         }
+    }
+
+    fn resume(&mut self, seen: &Seen, _: Seconds) {
+        // What is wrong with the measurement fails the step that follows.
+        drop(self.newest.hear(seen.encoders, seen.at));
+        // The plan has waited for the wheels. For how long only they know: the gate had braked before it said so.
+        let obeyed = self.newest.elapsed() + self.newest.age(seen.at) + self.params.lead;
+        let waits = self.due.was_at(self.real(), self.planned());
+        self.zero = self.zero.map(|_| obeyed - Seconds(waits));
+        self.last = Dwm::rest(Seconds::ZERO);
     }
 
     fn account(&self) -> Account {
@@ -214,10 +241,18 @@ impl DCorrector {
         let error = self.due.distances(self.planned()).zip(self.real(), |due, real| due - real);
         self.check_lost(error)?;
         if self.planned() < self.due.total() {
-            let target = self.corrected((obeyed - zero).0, error);
-            self.command(target)
+            let now = (obeyed - zero).0;
+            let target = self.corrected(now, error).map(|speed| speed.0);
+            let (target, nearness) = match self.due.total() - now {
+                left if left <= 0.0 => (target, Nearness::Near),
+                // What is too far shortly before the end is not taken back before it: that would be once more.
+                left if left <= LATE => (self.with_the_plan(now, target), Nearness::Far),
+                _ => (target, Nearness::Far),
+            };
+            let speeds = self.manners.allow(target, nearness, seen.at);
+            self.command(speeds.map(MetresPerSecond))
         } else {
-            self.finish(error)
+            self.finish(error, seen.at)
         }
     }
 
@@ -252,6 +287,16 @@ impl DCorrector {
         }
     }
 
+    /// The speeds that are not against the direction in which the plan has the wheels run at the end of a beat, m/s.
+    fn with_the_plan(&self, now: f64, target: Sides<f64>) -> Sides<f64> {
+        self.due.speeds(now + self.period.0).zip(
+            target,
+            |due, target| {
+                if due.0 * target < 0.0 { 0.0 } else { target }
+            },
+        )
+    }
+
     /// model.md 4.5, with its symbols: e error, w speed beyond that of the plan, ΔT period, p pole.
     /// w' = α e/ΔT - β w, α = (1-p)², β = (1-2p-p²)/2; w is that of the command as it was limited (anti-windup).
     fn damped(&self, now: f64, error: Sides<Metres>) -> Sides<MetresPerSecond> {
@@ -283,7 +328,7 @@ impl DCorrector {
     }
 
     /// What happens after the last movement of the plan, by the stamps: without measurements nothing settles.
-    fn finish(&mut self, error: Sides<Metres>) -> Result<Step, Refusal> {
+    fn finish(&mut self, error: Sides<Metres>, at: Seconds) -> Result<Step, Refusal> {
         let DParams { tolerance, settle, patience, .. } = self.params;
         // Nobody can stand more exactly than is measured.
         let tolerance = tolerance.max(Metres(self.grain.blur()));
@@ -304,9 +349,9 @@ impl DCorrector {
                 error.abs() <= tolerance * 0.5 || (stands && error.abs() <= tolerance)
             });
             let target = self.corrected(self.due.total(), error);
-            return self.command(
-                resting.zip(target, |rests, speed| if rests { MetresPerSecond::ZERO } else { speed }),
-            );
+            let speeds = resting.zip(target, |rests, speed| if rests { 0.0 } else { speed.0 });
+            let speeds = self.manners.allow(speeds, Nearness::Near, at);
+            return self.command(speeds.map(MetresPerSecond));
         }
         if self.last.peak_speed() <= MetresPerSecond::ZERO {
             return Ok(Step::Done);

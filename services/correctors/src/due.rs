@@ -66,6 +66,19 @@ impl Due {
         self.covered[index].zip(more, |sum, distance| sum + distance)
     }
 
+    /// When within the last seconds before `t` the distances `real` were due, as nearly as they were: the latest such
+    /// time, in steps of 10 ms.
+    pub(crate) fn was_at(&self, real: Sides<Metres>, t: f64) -> f64 {
+        let miss = |t: f64| {
+            let miss = self.distances(t).zip(real, |due, real| (due - real).abs().0);
+            miss.left + miss.right
+        };
+        let steps = (0..=300).map(|step| t - f64::from(step) * 0.01);
+        let least =
+            steps.map(|t| (t, miss(t))).reduce(|best, next| if next.1 < best.1 { next } else { best });
+        least.map_or(t, |(t, _)| t)
+    }
+
     /// The speeds that are due at `t`: those of the beginning before it, rest after the end.
     pub(crate) fn speeds(&self, t: f64) -> Sides<MetresPerSecond> {
         if t >= self.total {

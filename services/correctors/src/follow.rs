@@ -10,12 +10,13 @@
 
 use crate::body::Body;
 use crate::finish::{Finish, Progress, Since, Zone};
+use crate::manners::{Manners, Nearness};
 use crate::newest::Watch;
 use crate::path::{Limits, Path, Place, travel};
 use crate::route::{self, Part};
 use axle_schema::contract::{Account, Bounds as _, Seen, Step};
 use axle_schema::refusal::within;
-use axle_schema::{Drivetrain, Plan, Pose, Radians, Refusal, Seconds, Twist};
+use axle_schema::{Drivetrain, Plan, Pose, Radians, Refusal, Seconds, Sides, Twist};
 
 /// The jump of a wheel speed at a joint that is spread over this time by the wheels, s.
 const JOINT: f64 = 0.08;
@@ -136,6 +137,7 @@ pub(crate) struct Follower<S> {
     whole: f64,
     left: f64,
     calm: Since,
+    manners: Manners,
     progress: Progress,
 }
 
@@ -184,6 +186,7 @@ impl<S: Steering> Follower<S> {
             whole,
             left: whole,
             calm,
+            manners: Manners::default(),
             progress,
         };
         if follower.is_skipped() {
@@ -195,6 +198,11 @@ impl<S: Steering> Follower<S> {
     /// One beat.
     pub(crate) fn step(&mut self, seen: &Seen) -> Step {
         self.decide(seen).unwrap_or_else(Step::Fail)
+    }
+
+    /// The robot has braked without a command, and goes on from where it is.
+    pub(crate) fn resume(&mut self, seen: &Seen) {
+        self.body.resume(seen);
     }
 
     /// What the last beat was about.
@@ -210,11 +218,11 @@ impl<S: Steering> Follower<S> {
         self.body.hear(seen)?;
         self.rules.finish = self.finish.resolved(self.body.blur(), self.rules.robot.track);
         let pose = self.body.pose_at(seen.at);
-        let mut want = self.want(pose);
+        let mut want = self.want(pose, seen.at);
         let is_last = |part: usize, parts: &[Part]| part + 1 >= parts.len();
         if matches!(want, Want::Rest) && self.body.wheels.stand() && !is_last(self.part, &self.parts) {
             self.advance();
-            want = self.want(pose);
+            want = self.want(pose, seen.at);
         }
         if self.progress.wait(self.left, self.body.stamp()) > self.rules.finish.patience {
             return self.give_up(seen.at);
@@ -260,10 +268,10 @@ impl<S: Steering> Follower<S> {
         }
     }
 
-    /// What the part asks for when the robot is at `pose`.
-    fn want(&mut self, pose: Pose) -> Want {
+    /// What the part asks for at the beat `at` when the robot is at `pose`.
+    fn want(&mut self, pose: Pose, at: Seconds) -> Want {
         let stands = self.body.wheels.stand();
-        let (want, left) = match &self.parts[self.part] {
+        let (want, left, off) = match &self.parts[self.part] {
             Part::Turn { from, angle, loose } => {
                 let heading = pose.heading.0;
                 let planned = || heading - (pose.heading - *from).wrapped().0 + angle.0;
@@ -271,7 +279,7 @@ impl<S: Steering> Follower<S> {
                 let omega = self.rules.turning(rest, self.rules.finish.heading.0.max(*loose), stands);
                 let aim = Aim { v: 0.0, omega, off: rest };
                 let want = if omega.abs() > 0.0 { Want::Move(aim) } else { Want::Rest };
-                (want, rest.abs() * self.rules.robot.track.get() / 2.0)
+                (want, rest.abs() * self.rules.robot.track.get() / 2.0, 0.0)
             }
             Part::Way(path) => {
                 let pose = travel(pose, path.forward);
@@ -284,11 +292,25 @@ impl<S: Steering> Follower<S> {
                 let aim = aim(&mut self.steering, way, along, stands);
                 let want = aim.map_or(Want::Rest, |aim| Want::Move(Aim { v: aim.v * sign, ..aim }));
                 let off = aim.map_or(0.0, |aim| aim.off.abs()) * self.rules.robot.track.get() / 2.0;
-                (want, path.left(self.place).abs() + off)
+                (want, path.left(self.place).abs(), off)
             }
         };
-        self.left = left + self.later;
-        want
+        self.left = left + off + self.later;
+        self.mannered(want, left + self.later, at)
+    }
+
+    /// The same, or rest where a wheel would run to and fro at the goal, which is `far` away, m.
+    fn mannered(&mut self, want: Want, far: f64, at: Seconds) -> Want {
+        let Want::Move(Aim { v, omega, .. }) = want else { return want };
+        let (finish, arm) = (&self.rules.finish, self.rules.robot.track.get() / 2.0);
+        let enough = finish.tolerance.0.min(finish.heading.0 * arm) * NEAR;
+        let nearness = match far {
+            far if far > finish.radius.0 * 2.0 => Nearness::Far,
+            _ if self.left > enough => Nearness::Near,
+            _ => Nearness::Enough,
+        };
+        let speeds = self.manners.allow(Sides::new(v - omega * arm, v + omega * arm), nearness, at);
+        if speeds.left.abs() + speeds.right.abs() > 0.0 { want } else { Want::Rest }
     }
 
     /// Whether the measurements say that the last part is at its end.

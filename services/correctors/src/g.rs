@@ -20,6 +20,7 @@ use crate::finish::{Finish, Progress, Since, Zone};
 use crate::follow::{Rules, check_period};
 use crate::friction::Friction;
 use crate::grain::Grain;
+use crate::manners::{Manners, Nearness};
 use crate::newest::{Newest, Watch};
 use crate::route;
 use crate::stall::Stall;
@@ -66,7 +67,7 @@ pub struct Ratio {
 
 impl Default for Ratio {
     fn default() -> Self {
-        Self { proportional: 0.1, integral: 5.0, derivative: 0.0 }
+        Self { proportional: 0.104, integral: 7.278, derivative: 0.0 }
     }
 }
 
@@ -97,10 +98,11 @@ pub struct GParams {
 }
 
 impl Default for GParams {
+    /// What the tournament's search found best; the parameter file says by how much.
     fn default() -> Self {
         Self {
             period: Seconds(0.05),
-            lead: Seconds(0.06),
+            lead: Seconds(0.062),
             effort: 0.8,
             feedback: Feedback::default(),
             still: Seconds(0.5),
@@ -154,6 +156,7 @@ pub struct GCorrector {
     change: f64,
     counted: Seconds,
     calm: Since,
+    manners: Manners,
     progress: Progress,
 }
 
@@ -196,6 +199,7 @@ impl Corrector for GCorrector {
             change: 0.0,
             counted: seen.at,
             calm: Since::default(),
+            manners: Manners::default(),
             progress: Progress::new(),
         })
     }
@@ -206,6 +210,17 @@ impl Corrector for GCorrector {
             return Step::Done;
         }
         self.decide(seen).unwrap_or_else(Step::Fail)
+    }
+
+    fn resume(&mut self, seen: &Seen, _: Seconds) {
+        // What is wrong with the measurement fails the step that follows.
+        if let Some(turned) = &mut self.turned {
+            drop(turned.hear(seen));
+        }
+        drop(self.newest.hear(seen.encoders, seen.at));
+        self.wheels.rest();
+        self.stall = Stall::default();
+        self.counted = seen.at;
     }
 
     fn account(&self) -> Account {
@@ -243,6 +258,7 @@ impl GCorrector {
             at = self.real().zip(later, |real, later| real + later);
             speeds = self.speeds(at);
         }
+        let speeds = self.manners.allow(speeds, self.nearness(at), now);
         let rests = speeds.left.abs() + speeds.right.abs() <= 0.0;
         self.end(rests, at).unwrap_or_else(|| self.command(speeds, now))
     }
@@ -294,6 +310,22 @@ impl GCorrector {
         self.params.finish.resolved(self.grain.blur(), self.params.robot.track)
     }
 
+    /// How far the worse wheel is from its end of the leg, if it has come to `at`, m.
+    fn worst(&self, at: Sides<f64>) -> f64 {
+        self.legs.get(self.leg).map_or(0.0, |leg| (leg.s - leg.covered(at)).abs().max(leg.error(at).abs()))
+    }
+
+    /// How near the end of the plan is from there.
+    fn nearness(&self, at: Sides<f64>) -> Nearness {
+        let (finish, worst) = (self.finish(), self.worst(at));
+        let is_last = self.leg + 1 == self.legs.len();
+        match worst {
+            worst if is_last && worst <= finish.tolerance.0 * NEAR => Nearness::Enough,
+            worst if is_last && worst <= finish.radius.0 => Nearness::Near,
+            _ => Nearness::Far,
+        }
+    }
+
     /// The wheel speeds of the next command, for distances `at` which it will be obeyed, m/s.
     fn speeds(&self, at: Sides<f64>) -> Sides<f64> {
         let Some(leg) = self.legs.get(self.leg) else { return Sides::new(0.0, 0.0) };
@@ -314,19 +346,17 @@ impl GCorrector {
 
     /// The end of the task, if it is there.
     fn end(&mut self, rests: bool, at: Sides<f64>) -> Option<Result<Step, Refusal>> {
-        let leg = self.legs.get(self.leg)?;
         let (finish, real, stamp) = (self.finish(), self.real(), self.newest.value().stamp);
-        let worst = |at: Sides<f64>| (leg.s - leg.covered(at)).abs().max(leg.error(at).abs());
         let later: f64 = self.legs.iter().skip(self.leg + 1).map(|leg| leg.s).sum();
         let is_last = self.leg + 1 == self.legs.len();
-        let arrived = rests && is_last && worst(real) <= finish.tolerance.0;
+        let arrived = rests && is_last && self.worst(real) <= finish.tolerance.0;
         let settled = self.calm.holds(arrived, stamp).is_some_and(|time| time >= finish.settle);
-        let stuck = self.progress.wait(later + worst(at), stamp) > finish.patience;
+        let stuck = self.progress.wait(later + self.worst(at), stamp) > finish.patience;
         if !(settled || stuck) {
             return None;
         }
-        if stuck && !(is_last && worst(real) <= finish.tolerance.0 * NEAR) {
-            let (left, patience) = (worst(real), finish.patience);
+        if stuck && !(is_last && self.worst(real) <= finish.tolerance.0 * NEAR) {
+            let (left, patience) = (self.worst(real), finish.patience);
             let why = format!(
                 "the robot makes no progress: for {patience} its wheels have come no closer to the end of leg {} \
                  of {}, {left:.3} m away",

@@ -13,7 +13,7 @@
 //! of the beats, the stamps of the measurements are the only clock of the robot; the wheels are commanded within the
 //! limits of the robot; a task ends with a command to rest, or fails with a reason. The parts that several of them are
 //! made of are modules of their own: `newest.rs` for what is believed of measurements, `wheels.rs` for limits and
-//! memory, `friction.rs` and `grain.rs` for what poor motors and encoders cannot do, `finish.rs` for endings, `path.rs` and `route.rs` for plans, `follow.rs` for all that steer by the pose.
+//! memory, `friction.rs` and `grain.rs` for what poor motors and encoders cannot do, `finish.rs` and `manners.rs` for endings, `path.rs` and `route.rs` for plans, `follow.rs` for all that steer by the pose.
 
 pub mod arc;
 mod body;
@@ -25,11 +25,13 @@ mod friction;
 pub mod g;
 mod grain;
 pub mod ltv;
+mod manners;
 mod newest;
 mod path;
 pub mod pursuit;
 mod route;
 mod stall;
+pub mod tenure;
 pub mod w;
 mod wheels;
 

@@ -17,6 +17,7 @@ use crate::body::Body;
 use crate::due::Due;
 use crate::finish::{Finish, Since, Zone};
 use crate::follow::{Rules, check_period};
+use crate::manners::{LATE, Manners, Nearness};
 use crate::newest::Watch;
 use axle_schema::contract::{Account, Bounds, Corrector, Params, Seen, Step};
 use axle_schema::refusal::within;
@@ -61,13 +62,14 @@ pub struct LtvParams {
 }
 
 impl Default for LtvParams {
+    /// What the tournament's search found best; the parameter file says by how much.
     fn default() -> Self {
         Self {
             period: Seconds(0.05),
-            lead: Seconds(0.06),
-            along: Metres(0.06),
-            aside: Metres(0.06),
-            heading: Radians(0.4),
+            lead: Seconds(0.094),
+            along: Metres(0.075),
+            aside: Metres(0.016),
+            heading: Radians(0.404),
             speed: MetresPerSecond(0.2),
             turn_rate: RadiansPerSecond(1.0),
             lost: Metres(0.5),
@@ -113,6 +115,7 @@ pub struct LtvCorrector {
     /// The robot time at which the plan begins; known from the first beat on.
     zero: Option<Seconds>,
     calm: Since,
+    manners: Manners,
     /// Whether a wheel is left alone after the last movement.
     rests: Sides<bool>,
 }
@@ -141,6 +144,7 @@ impl Corrector for LtvCorrector {
             body,
             zero: None,
             calm: Since::default(),
+            manners: Manners::default(),
             rests: Sides::new(true, true),
         })
     }
@@ -151,6 +155,12 @@ impl Corrector for LtvCorrector {
             return Step::Done;
         }
         self.decide(seen).unwrap_or_else(Step::Fail)
+    }
+
+    fn resume(&mut self, seen: &Seen, pause: Seconds) {
+        self.body.resume(seen);
+        // The plan has waited for the wheels.
+        self.zero = self.zero.map(|zero| zero + pause);
     }
 
     fn account(&self) -> Account {
@@ -182,7 +192,17 @@ impl LtvCorrector {
         let twist = Twist::of_wheels(self.due.speeds(now + self.rules.period.0), track);
         let here = Twist::of_wheels(self.due.speeds(now), track);
         let (v, omega) = self.gains.correction(here.v.0, error);
-        self.body.drive(twist.v.0 + v, twist.omega.0 + omega, seen.at)
+        let corrected =
+            Twist { v: twist.v + MetresPerSecond(v), omega: twist.omega + RadiansPerSecond(omega) };
+        let mut speeds = corrected.wheel_speeds(track).map(|speed| speed.0);
+        if self.due.total() - now <= LATE {
+            // What is too far shortly before the end is not taken back before it: that would be once more.
+            let due = twist.wheel_speeds(track);
+            speeds = due.zip(speeds, |due, speed| if due.0 * speed < 0.0 { 0.0 } else { speed });
+        }
+        self.manners.allow(speeds, Nearness::Far, seen.at);
+        let Twist { v, omega } = Twist::of_wheels(speeds.map(MetresPerSecond), track);
+        self.body.drive(v.0, omega.0, seen.at)
     }
 
     /// What happens after the last movement of the plan, `now` by its clock; `error` is how the goal is seen.
@@ -199,9 +219,13 @@ impl LtvCorrector {
         let tolerance = finish.tolerance.0.min(finish.heading.0 * arm).max(blur);
         let zone = Zone { tolerance, slowest: self.rules.creep(tolerance), stands: false };
         let deceleration = self.rules.deceleration();
-        let speeds = Sides::new(error.x.0 - turn, error.x.0 + turn)
+        let left = Sides::new(error.x.0 - turn, error.x.0 + turn);
+        let near = left.left.abs().max(left.right.abs()) <= tolerance * NEAR;
+        let speeds = left
             // What the plan has brought within the tolerance is not touched again.
             .zip(self.rests, |left, stands| finish.speed(left, Zone { stands, ..zone }, deceleration));
+        let nearness = if near { Nearness::Enough } else { Nearness::Near };
+        let speeds = self.manners.allow(speeds, nearness, at);
         self.rests = speeds.map(|speed| speed.abs() <= 0.0);
         let goal = self.due.pose(self.due.total(), self.params.robot.track);
         let real = goal.seen_from(self.body.pose());

@@ -45,13 +45,14 @@ pub struct PursuitParams {
 }
 
 impl Default for PursuitParams {
+    /// What the tournament's search found best; the parameter file says by how much.
     fn default() -> Self {
         Self {
             period: Seconds(0.05),
             lead: Seconds(0.06),
             effort: 0.8,
-            lookahead: Seconds(0.5),
-            nearest: Metres(0.12),
+            lookahead: Seconds(0.348),
+            nearest: Metres(0.137),
             farthest: Metres(0.6),
             radius: Metres(0.3),
             rotate: Radians(0.8),
@@ -107,6 +108,9 @@ impl Corrector for PursuitCorrector {
     }
     fn step(&mut self, seen: &Seen) -> Step {
         self.0.step(seen)
+    }
+    fn resume(&mut self, seen: &Seen, _: Seconds) {
+        self.0.resume(seen);
     }
     fn account(&self) -> Account {
         self.0.account()

@@ -21,9 +21,11 @@ use axle_schema::{
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 
+mod arrows;
 mod driver;
 mod field;
 
+pub use arrows::{Arrow, MAX_ARROWS, arrows};
 pub use driver::Driver;
 use driver::Multiplicative;
 pub use field::Field;
@@ -67,17 +69,18 @@ pub struct WParams {
 }
 
 impl Default for WParams {
+    /// What the tournament's search found best; the parameter file says by how much.
     fn default() -> Self {
         Self {
             period: Seconds(0.05),
-            lead: Seconds(0.06),
+            lead: Seconds(0.102),
             effort: 0.8,
             field: Field::default(),
             driver: Driver::default(),
             arrival: Metres(0.03),
             floor: MetresPerSecond(0.1),
-            pull: PerMetre(5.0),
-            turning: 4.0,
+            pull: PerMetre(6.982),
+            turning: 5.714,
             factor: 1.3,
             step: RadiansPerSecond(0.3),
             foresight: Seconds(0.35),
@@ -132,6 +135,9 @@ impl Corrector for WCorrector {
     }
     fn step(&mut self, seen: &Seen) -> Step {
         self.0.step(seen)
+    }
+    fn resume(&mut self, seen: &Seen, _: Seconds) {
+        self.0.resume(seen);
     }
     fn account(&self) -> Account {
         self.0.account()

@@ -59,6 +59,12 @@ impl Wheels {
         Ok(self.last)
     }
 
+    /// The gate has brought the wheels to rest, whatever was commanded.
+    pub(crate) fn rest(&mut self) {
+        self.last = Dwm::rest(Seconds::ZERO);
+        self.said.clear();
+    }
+
     /// What was commanded last.
     pub(crate) const fn last(&self) -> &Dwm {
         &self.last

@@ -96,31 +96,54 @@ impl Course {
     /// # Errors
     /// What the planners refuse.
     pub fn brief(&self, seed: u64) -> Result<Brief, Refusal> {
+        self.brief_with(seed, &PathdriverParams::default())
+    }
+
+    /// The same, driven in another manner.
+    ///
+    /// # Errors
+    /// What the planners refuse.
+    pub fn brief_with(&self, seed: u64, params: &PathdriverParams) -> Result<Brief, Refusal> {
         let plan = match self.way {
-            Way::Points(way) => find_path(WayTask::parse(way)?)?,
-            Way::Random => find_path(WayTask { points: scattered(&mut Random::new(seed, 20)) })?,
+            Way::Points(way) => return Brief::along(WayTask::parse(way)?, params),
+            Way::Random => {
+                let way = WayTask { points: scattered(&mut Random::new(seed, 20)) };
+                return Brief::along(way, params);
+            }
             Way::Legs(geometries) => {
                 let leg = |geometry: &Geometry| Leg { geometry: *geometry, point: 0, speed: None };
                 let legs: Vec<Leg> = geometries.iter().map(leg).collect();
                 let length = legs.iter().map(|leg| leg.geometry.length()).sum();
-                Plan { start: Pose::default(), legs, length, notes: Vec::new() }
+                Plan { legs, length, ..Plan::default() }
             }
         };
-        let ask = DriveAsk { legs: plan.legs.clone(), speeds: None, robot: None };
-        Ok(Brief { drive: Pathdriver::answer(&PathdriverParams::default(), &ask)?, plan })
+        Brief::of(plan, params)
     }
 }
 
 impl Brief {
+    /// Plans a way from the origin with Pathfinder and its default parameters, and Pathdriver.
+    ///
+    /// # Errors
+    /// What the planners refuse.
+    pub fn along(way: WayTask, params: &PathdriverParams) -> Result<Self, Refusal> {
+        Self::of(
+            Pathfinder::answer(&PathfinderParams::default(), &PlanAsk { way, ..PlanAsk::default() })?,
+            params,
+        )
+    }
+
+    /// The movements for a plan.
+    pub(crate) fn of(plan: Plan, params: &PathdriverParams) -> Result<Self, Refusal> {
+        let ask = DriveAsk { legs: plan.legs.clone(), ..DriveAsk::default() };
+        Ok(Self { drive: Pathdriver::answer(params, &ask)?, plan })
+    }
+
     /// Where the course ends.
     #[must_use]
     pub fn goal(&self) -> Pose {
         self.plan.legs.iter().fold(self.plan.start, |pose, leg| leg.geometry.end_from(pose))
     }
-}
-
-fn find_path(way: WayTask) -> Result<Plan, Refusal> {
-    Pathfinder::answer(&PathfinderParams::default(), &PlanAsk { way, start: None })
 }
 
 /// Five points, each at least half a metre from the one before.

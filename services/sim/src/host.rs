@@ -4,12 +4,13 @@ use crate::course::Brief;
 use crate::link::Link;
 use crate::robot::{BOOT, ToRobot};
 use crate::seat::{Running, Seat};
+use axle_correctors::tenure::{Hold, Tenure};
 use axle_navigator::{Navigator, NavigatorParams};
 use axle_schema::codec::encode;
-use axle_schema::command::{Class, Command, GateState, Lease, LeaseAsk, Release};
+use axle_schema::command::{Class, GateState, Lease, LeaseAsk, Release};
 use axle_schema::contract::{Seen, Step};
 use axle_schema::meta::Meta;
-use axle_schema::{EncodersData, InertialData, Refusal, Seconds, Tick};
+use axle_schema::{EncodersData, InertialData, Refusal, Seconds};
 use axle_source::{Source, SourceParams};
 
 /// What is said to the host.
@@ -31,8 +32,8 @@ pub(crate) enum Stage {
     Idle,
     /// The gate is asked for the wheels.
     Asking,
-    /// The corrector drives.
-    Driving { corrector: Box<dyn Running>, lease: Lease, seq: u32 },
+    /// The corrector drives; or the wheels have slipped, and the gate is asked for them again.
+    Driving { corrector: Box<dyn Running>, tenure: Tenure, asked: bool },
     /// It is over.
     Over(Result<(), Refusal>),
 }
@@ -71,6 +72,23 @@ impl<'a> Host<'a> {
         })
     }
 
+    /// Gives the host another task; the robot stands, and is known to be where it is.
+    #[cfg(test)]
+    pub(crate) fn again(&mut self, brief: &'a Brief) {
+        (self.brief, self.granted, self.stage) = (brief, None, Stage::Idle);
+    }
+
+    /// What the corrector is shown.
+    pub(crate) const fn seen(&self) -> &Seen {
+        &self.seen
+    }
+
+    /// Where the robot is believed to be.
+    #[cfg(test)]
+    pub(crate) fn pose(&self) -> Option<axle_schema::NavigatorData> {
+        self.seen.pose
+    }
+
     /// Hears what has arrived: source and navigator act at once, the corrector at its beat.
     pub(crate) fn hear(&mut self, now: Seconds, up: &mut Link<ToHost>) {
         while let Some(heard) = up.receive(now) {
@@ -99,9 +117,7 @@ impl<'a> Host<'a> {
         self.seen.at = at;
         match &mut self.stage {
             Stage::Idle if self.seen.pose.is_some() => {
-                let (holder, class) = (self.seat.name.to_owned(), Class::Corrector);
-                let ask = LeaseAsk { holder, class, period: self.seat.period };
-                down.send_surely(now, ToRobot::Lease(ask));
+                self.ask_for_lease(now, down);
                 self.stage = Stage::Asking;
             }
             Stage::Idle | Stage::Over(_) => {}
@@ -112,7 +128,8 @@ impl<'a> Host<'a> {
                 let begun = granted.and_then(|lease| Ok((lease, self.seat.begin(self.brief, &self.seen)?)));
                 match begun {
                     Ok((lease, corrector)) => {
-                        self.stage = Stage::Driving { corrector, lease, seq: 0 };
+                        let tenure = Tenure::new(lease, self.seat.period, at);
+                        self.stage = Stage::Driving { corrector, tenure, asked: false };
                         self.step(now, down);
                     }
                     Err(refusal) => self.stage = Stage::Over(Err(refusal)),
@@ -122,44 +139,53 @@ impl<'a> Host<'a> {
         }
     }
 
+    fn ask_for_lease(&self, now: Seconds, down: &mut Link<ToRobot>) {
+        let (holder, class) = (self.seat.name.to_owned(), Class::Corrector);
+        down.send_surely(now, ToRobot::Lease(LeaseAsk { holder, class, period: self.seat.period }));
+    }
+
     /// One step of the corrector, one command.
     fn step(&mut self, now: Seconds, down: &mut Link<ToRobot>) {
-        let Stage::Driving { corrector, lease, seq } = &mut self.stage else { return };
-        let lost = |state: &GateState| {
-            let fenced = *seq > 1 && state.epoch == lease.epoch && state.holder.is_none();
-            let why = "the gate took the wheels back: commands came too late or not at all";
-            fenced.then(|| Refusal::Fenced { why: why.into() })
-        };
-        let end = if let Some(lost) = self.state.as_ref().and_then(lost) {
-            Err(lost)
-        } else {
-            match corrector.step(&self.seen) {
-                Step::Done => Ok(()),
-                Step::Fail(refusal) => Err(refusal),
-                Step::Drive(dwm) => {
-                    *seq += 1;
-                    let echo = self.seen.encoders.map_or(lease.tick, |encoders| Tick::of(encoders.stamp));
-                    #[allow(
-                        clippy::cast_possible_truncation,
-                        clippy::cast_sign_loss,
-                        reason = "at most 1500"
-                    )]
-                    let ttl_ms = (self.seat.period.0 * 3000.0).clamp(150.0, 1500.0) as u16;
-                    let Lease { boot, epoch, .. } = *lease;
-                    let command = Command { boot, epoch, seq: *seq, echo, ttl_ms, dwm };
-                    match encode(&command) {
-                        Ok(bytes) => {
-                            down.send(now, ToRobot::Command(bytes));
-                            return;
-                        }
-                        Err(refusal) => Err(refusal),
-                    }
+        let Stage::Driving { corrector, tenure, asked } = &mut self.stage else { return };
+        let at = self.seen.at;
+        if *asked {
+            match self.granted.take() {
+                None => match tenure.wait(at) {
+                    Ok(()) => return,
+                    Err(refusal) => return self.end(now, Err(refusal), down),
+                },
+                Some(Ok(lease)) => {
+                    (*asked, self.state) = (false, None);
+                    let pause = tenure.regain(lease, at);
+                    corrector.resume(&self.seen, pause);
                 }
+                Some(Err(refusal)) => return self.end(now, Err(refusal), down),
             }
-        };
-        let release = Release { boot: lease.boot, epoch: lease.epoch };
-        down.send_surely(now, ToRobot::Release(release));
-        self.stage = Stage::Over(end);
+        }
+        match tenure.look(self.state.as_ref(), at) {
+            Hold::Held => {}
+            Hold::Slipped => {
+                *asked = true;
+                return self.ask_for_lease(now, down);
+            }
+            Hold::Lost(refusal) => return self.end(now, Err(refusal), down),
+        }
+        match corrector.step(&self.seen) {
+            Step::Done => self.end(now, Ok(()), down),
+            Step::Fail(refusal) => self.end(now, Err(refusal), down),
+            Step::Drive(dwm) => match encode(&tenure.command(&self.seen, dwm)) {
+                Ok(bytes) => down.send(now, ToRobot::Command(bytes)),
+                Err(refusal) => self.end(now, Err(refusal), down),
+            },
+        }
+    }
+
+    /// Ends the task, and gives the wheels back.
+    fn end(&mut self, now: Seconds, how: Result<(), Refusal>, down: &mut Link<ToRobot>) {
+        if let Stage::Driving { tenure, .. } = std::mem::replace(&mut self.stage, Stage::Over(how)) {
+            let &Lease { boot, epoch, .. } = tenure.lease();
+            down.send_surely(now, ToRobot::Release(Release { boot, epoch }));
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::run::{Ending, Mill, run};
 use crate::seat::{Seat, seats};
-use crate::{ALL, COURSES, Course, Run, SCENARIOS, Scenario, Tournament, World};
+use crate::{ALL, COURSES, Course, Run, SCENARIOS, Scenario, TRIALS, Tournament, World};
 use axle_correctors::{DCorrector, DParams};
 use axle_gate::Gate;
 use axle_schema::command::{BrakeCause, Motion};
@@ -64,6 +64,7 @@ impl Corrector for Wrong {
         self.last = dwm.end();
         Step::Drive(dwm)
     }
+    fn resume(&mut self, _: &Seen, _: Seconds) {}
     fn account(&self) -> Account {
         Account::default()
     }
@@ -115,6 +116,54 @@ fn poor_motors_and_coarse_encoders_hinder_no_corrector() {
             );
         }
     }
+}
+
+#[test]
+fn no_corrector_hunts_at_any_goal_in_any_scenario() {
+    let mut faults = String::new();
+    for (seat, course) in
+        seats().iter().flat_map(|seat| COURSES.iter().map(move |course| (seat.clone(), course)))
+    {
+        for scenario in SCENARIOS.iter().chain(TRIALS) {
+            let run = run(&seat, &course.brief(2).expect(course.name), &scenario.world(2)).expect("a run");
+            if run.hunting > 1 {
+                let times = run.hunting;
+                faults += &format!("{} on {}, {}: {times} times\n", seat.name, course.name, scenario.name);
+            }
+        }
+    }
+    assert!(faults.is_empty(), "a wheel changed its direction in the last second:\n{faults}");
+}
+
+/// Over a link that takes so long up and down, in s, every corrector succeeds on every course, with this `lead` or its own.
+fn succeeds_over(up: f64, down: f64, lead: Option<f64>) {
+    for seat in seats() {
+        let mut values = seat.values();
+        let last = values.last_mut().expect("the lead is the last knob of all");
+        *last = lead.unwrap_or(*last);
+        let seat = seat.tuned(&values).expect("within the range");
+        // The seed decides where in the beats of the robot those of the corrector lie.
+        for (seed, course) in (1..).zip(COURSES) {
+            let mut world = World::clean(seed);
+            (world.up.delay, world.down.delay) = (Seconds(up), Seconds(down));
+            let run = run(&seat, &course.brief(seed).expect(course.name), &world).expect("a run");
+            let what = format!("{} on {}, {up} s up and {down} s down", seat.name, course.name);
+            assert!(run.ending == Ending::Done && run.values[7] > 0.0, "{what}: {:?}", run.ending);
+            assert!(run.hunting <= 1, "{what}: {} reversals", run.hunting);
+        }
+    }
+}
+
+#[test]
+fn a_link_of_100_ms_there_and_back_ends_no_task() {
+    succeeds_over(0.04, 0.06, None);
+    succeeds_over(0.01, 0.09, None);
+}
+
+#[test]
+fn a_link_of_180_ms_ends_none_where_the_lead_knows_of_it() {
+    succeeds_over(0.08, 0.1, Some(0.2));
+    succeeds_over(0.02, 0.16, Some(0.2));
 }
 
 #[test]
@@ -179,6 +228,44 @@ fn a_cut_link_is_seen_by_the_gate_and_the_robot_comes_to_rest() {
 }
 
 #[test]
+fn every_corrector_ends_its_task_in_every_scenario() {
+    for (row, scenario) in SCENARIOS.iter().enumerate() {
+        for (column, seat) in seats().iter().enumerate() {
+            let course = &COURSES[(row + column) % COURSES.len()];
+            let seed = 7;
+            let run = run(seat, &course.brief(seed).expect("a plan"), &scenario.world(seed)).expect("a run");
+            let what = format!("{}, {}, {}", seat.name, course.name, scenario.name);
+            assert_eq!(run.ending, Ending::Done, "{what}");
+        }
+    }
+}
+
+#[test]
+fn lost_commands_brake_the_robot_and_do_not_end_the_task() {
+    for seat in seats() {
+        let brief = Course::find("square").expect("a course").brief(1).expect("a plan");
+        let mut world = World::clean(1);
+        world.down.loss = 0.1;
+        let mut mill = Mill::new(&seat, &brief, &world).expect("a mill");
+        let mut slipped = 0;
+        let mut holds = true;
+        while !matches!(mill.host.stage, crate::host::Stage::Over(_)) {
+            mill.beat();
+            let held = mill.robot.gate.state(mill.now).holder.is_some();
+            slipped += u32::from(holds && !held && mill.now > Seconds(1.0));
+            holds = held;
+            assert!(mill.now < Seconds(60.0), "{} comes to no end", seat.name);
+        }
+        let crate::host::Stage::Over(end) = &mill.host.stage else { panic!("it is over") };
+        assert_eq!(end, &Ok(()), "{} after {slipped} losses", seat.name);
+        assert!(slipped > 0, "{}: a tenth of the commands is lost, and nothing happens", seat.name);
+        while !mill.robot.rests() {
+            mill.beat();
+        }
+    }
+}
+
+#[test]
 fn a_corrector_without_measurements_gives_up_and_the_robot_stands() {
     let (seat, brief) = (d(), Course::find("straight").expect("a course").brief(1).expect("a plan"));
     let mut mill = Mill::new(&seat, &brief, &World::clean(1)).expect("a mill");
@@ -221,6 +308,9 @@ impl Corrector for Probe {
             assert!(is >= was, "{seen:?} after {last:?}");
         }
         self.inner.step(seen)
+    }
+    fn resume(&mut self, seen: &Seen, pause: Seconds) {
+        self.inner.resume(seen, pause);
     }
     fn account(&self) -> Account {
         self.inner.account()

@@ -24,13 +24,19 @@ mod tournament;
 mod tune;
 
 #[cfg(test)]
+mod fleet;
+#[cfg(test)]
 mod laws;
+#[cfg(test)]
+mod plans;
+#[cfg(test)]
+mod profiles;
 
 pub use course::{Brief, COURSES, Course};
 pub use link::{Link, LinkParams};
 pub use metrics::{METRICS, Metric};
-pub use run::{Ending, Run, run};
-pub use scenario::{SCENARIOS, Scenario, World};
+pub use run::{Ending, Run, run, sights};
+pub use scenario::{SCENARIOS, Scenario, TRIALS, World};
 pub use seat::{Knob, Running, Seat, Told, seats};
 pub use statistics::Interval;
 pub use tournament::{ALL, Estimate, Row, Tournament};

@@ -3,6 +3,7 @@
 use crate::course::Brief;
 use crate::robot::Robot;
 use axle_schema::{Geometry, Pose, Seconds, Sides};
+use std::collections::VecDeque;
 use std::f64::consts::PI;
 
 /// One measure; of each, less is better, but of the success rate.
@@ -36,6 +37,13 @@ const fn less(name: &'static str, title: &'static str) -> Metric {
 const NEAR: (f64, f64) = (0.05, PI / 18.0);
 /// Slower than this, in m/s, a wheel has no direction that could change.
 const SLOW: f64 = 2e-3;
+/// How many changes of direction of a wheel are remembered, to tell those before the end.
+const MEMORY: usize = 32;
+/// For so long before the end of a task they count as hunting.
+const HUNT: Seconds = Seconds(1.0);
+
+/// The times of the last changes of direction of a wheel.
+type Changes = VecDeque<Seconds>;
 
 /// Watches a run.
 pub(crate) struct Watch<'a> {
@@ -50,6 +58,7 @@ pub(crate) struct Watch<'a> {
     setpoints: Sides<f64>,
     directions: Sides<i8>,
     reversals: u32,
+    changes: Sides<Changes>,
     path: Vec<(f64, f64)>,
 }
 
@@ -73,20 +82,32 @@ impl<'a> Watch<'a> {
             setpoints: Sides::default(),
             directions: Sides::default(),
             reversals: 0,
+            changes: Sides::default(),
             path: Vec::new(),
         }
     }
 
     /// Looks at the robot after each of its beats; where it is, is looked at when `pose` says so.
     pub(crate) fn look(&mut self, robot: &Robot, pose: bool) {
+        let now = robot.truth().stamp;
         let span = robot.period().0;
         let setpoints = robot.setpoints().map(|speed| speed.0);
         let [left, right] = setpoints.zip(self.setpoints, |is, was| (is - was) / span).both();
         self.effort += (left * left + right * right) / 2.0 * span;
         self.setpoints = setpoints;
         let is = robot.rims().map(|speed| if speed.0.abs() < SLOW { 0 } else { speed.0.signum() as i8 });
-        let turned = is.zip(self.directions, |is, was| u32::from(is * was < 0)).both();
-        self.reversals += turned[0] + turned[1];
+        let turned = is.zip(self.directions, |is, was| is * was < 0);
+        for (turned, changes) in
+            [(turned.left, &mut self.changes.left), (turned.right, &mut self.changes.right)]
+        {
+            if turned {
+                self.reversals += 1;
+                if changes.len() == MEMORY {
+                    changes.pop_front();
+                }
+                changes.push_back(now);
+            }
+        }
         self.directions = is.zip(self.directions, |is, was| if is == 0 { was } else { is });
         if pose {
             let at = robot.truth().pose;
@@ -96,6 +117,12 @@ impl<'a> Watch<'a> {
             self.points += 1;
             self.path.push((at.x.0, at.y.0));
         }
+    }
+
+    /// How often the worse wheel has changed its direction in the last second before `over`, and since then.
+    pub(crate) fn hunting(&self, over: Seconds) -> usize {
+        let since = |changes: &Changes| changes.iter().filter(|&&at| at >= over - HUNT).count();
+        since(&self.changes.left).max(since(&self.changes.right))
     }
 
     /// The distance of a place from the path of the plan.

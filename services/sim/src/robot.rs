@@ -56,6 +56,12 @@ impl Robot {
         })
     }
 
+    /// The same robot among the walls of a map.
+    #[cfg(test)]
+    pub(crate) fn among(self, map: &axle_schema::MapData) -> Result<Self, Refusal> {
+        Ok(Self { emulator: self.emulator.among(map)?, ..self })
+    }
+
     /// One beat: what has arrived is heard, the wheels turn, and what was measured is sent.
     pub(crate) fn beat(&mut self, now: Seconds, down: &mut Link<ToRobot>, up: &mut Link<ToHost>) {
         while let Some(heard) = down.receive(now) {

@@ -8,6 +8,7 @@ use crate::robot::{Robot, ToRobot};
 use crate::scenario::World;
 use crate::seat::Seat;
 use axle_emulator::Random;
+use axle_schema::contract::Seen;
 use axle_schema::{Refusal, Seconds};
 
 /// The host's clock at the boot of the robot, s: no clocks agree, and none need to.
@@ -37,6 +38,8 @@ pub struct Run {
     pub ending: Ending,
     /// The measures, in the order of [`METRICS`].
     pub values: [f64; METRICS.len()],
+    /// How often the worse wheel changed its direction in the last second, and until it stood: more than once is hunting.
+    pub hunting: usize,
     /// Where the robot really was, 50 times in a second.
     pub path: Vec<(f64, f64)>,
     /// The time that it took, standstill at both ends included.
@@ -49,7 +52,7 @@ pub struct Run {
 /// Refuses a robot or links that cannot be. What goes wrong on the way is a result and no error.
 pub fn run(seat: &Seat, brief: &Brief, world: &World) -> Result<Run, Refusal> {
     let mut mill = Mill::new(seat, brief, world)?;
-    let longest = Seconds(brief.drive.duration.0 * PATIENCE.0 + PATIENCE.1);
+    let longest = longest(brief);
     let mut begun = None;
     while !matches!(mill.host.stage, Stage::Over(_)) && mill.now < longest {
         mill.beat();
@@ -67,8 +70,35 @@ pub fn run(seat: &Seat, brief: &Brief, world: &World) -> Result<Run, Refusal> {
         Stage::Over(Err(refusal)) => Ending::Failed(refusal),
         _ => Ending::Late,
     };
+    let hunting = mill.watch.hunting(over);
     let (values, path) = mill.watch.end(mill.robot.truth().pose, time, ending == Ending::Done);
-    Ok(Run { ending, values, path, virtual_time: mill.now })
+    Ok(Run { ending, values, hunting, path, virtual_time: mill.now })
+}
+
+/// What a corrector sees on a course, beat by beat from the beginning of its task on, so that its steps can be measured
+/// without the simulator around them.
+///
+/// # Errors
+/// As [`run`].
+pub fn sights(seat: &Seat, brief: &Brief, world: &World) -> Result<Vec<Seen>, Refusal> {
+    let mut mill = Mill::new(seat, brief, world)?;
+    let longest = longest(brief);
+    let mut sights: Vec<Seen> = Vec::new();
+    while !matches!(mill.host.stage, Stage::Over(_)) && mill.now < longest {
+        mill.beat();
+        let seen = mill.host.seen();
+        if matches!(mill.host.stage, Stage::Driving { .. })
+            && sights.last().is_none_or(|last| seen.at > last.at)
+        {
+            sights.push(*seen);
+        }
+    }
+    Ok(sights)
+}
+
+/// How long a task may take.
+fn longest(brief: &Brief) -> Seconds {
+    Seconds(brief.drive.duration.0 * PATIENCE.0 + PATIENCE.1)
 }
 
 /// Everything that takes part, and the one time that goes by.

@@ -94,13 +94,55 @@ pub const SCENARIOS: &[Scenario] = &[
             };
             world.robot.battery = BatteryParams { sag: 0.02, drain: 0.0 };
             world.robot.slip = SlipParams { rate: 0.1, length: Metres(0.03), share: 0.5 };
-            world.robot.encoders = EncodersParams { tick: Metres(0.001), noise: Metres(0.0002) };
+            world.robot.encoders =
+                EncodersParams { tick: Metres(0.001), noise: Metres(0.0002), ..robot.encoders };
             let wireless = Seconds(0.02);
             world.up = LinkParams { delay: Seconds(0.003), jitter: wireless, loss: 0.01, ..world.up };
             world.down = LinkParams { delay: Seconds(0.003), jitter: wireless, loss: 0.002, ..world.down };
         },
     },
 ];
+
+/// What a search for gains has its robots meet beside the scenarios, so that what it finds does not only fit those: each
+/// robot lies somewhere between the best and the worst one that a corrector must do with. Gains that are quick on a good
+/// robot and let a slow one hunt to and fro at its goal are found out here.
+pub const TRIALS: &[Scenario] = &[
+    Scenario {
+        name: "any-robot",
+        about: "up to 80 ms of delay in sum, motors with a lag of up to 60 ms, each wheel up to 3 % off",
+        spoil: |world, random| {
+            let gains =
+                Sides::new(random.uniform(), random.uniform()).map(|share| 1.0 + 0.06 * (share - 0.5));
+            slow(world, random.uniform(), random.uniform(), gains);
+        },
+    },
+    Scenario {
+        name: "worst-robot",
+        about: "80 ms of delay in sum, motors with a lag of 60 ms, wheels 3 % off to either side or both",
+        spoil: |world, random| {
+            let gains = Sides::new(side(random), side(random)).map(|side| 1.0 + 0.03 * side);
+            slow(world, 1.0, 1.0, gains);
+        },
+    },
+    Scenario {
+        name: "slow-link",
+        about: "100 to 160 ms there and back, on links that do not vary",
+        spoil: |world, random| {
+            let more = 0.03 * random.uniform();
+            (world.up.delay, world.down.delay) = (Seconds(0.04 + more), Seconds(0.06 + more));
+        },
+    },
+];
+
+/// A robot that is slow in several ways at once, with the encoders that most have. With more delay than this beats are
+/// steered that are two periods old, and the correctors are not made for it.
+fn slow(world: &mut World, delay: f64, lag: f64, gain: Sides<f64>) {
+    (world.up.delay, world.down.delay) = (Seconds(0.02 * delay), Seconds(0.06 * delay));
+    world.robot.motors.lag = Seconds(0.06 * lag);
+    world.robot.motors.gain = gain;
+    world.robot.encoders.tick = Metres(5e-4);
+    world.robot.encoders.noise = Metres(2e-4);
+}
 
 /// To the left or to the right, by chance.
 fn side(random: &mut Random) -> f64 {
@@ -119,7 +161,7 @@ impl World {
         let robot = EmulatorParams {
             seed,
             motors: MotorsParams { gain_deviation: 0.0, jitter: Metres::ZERO, ..MotorsParams::default() },
-            encoders: EncodersParams { tick: Metres(1e-5), noise: Metres::ZERO },
+            encoders: EncodersParams { tick: Metres(1e-5), ..EncodersParams::default() },
             gyro: GyroParams {
                 bias_deviation: RadiansPerSecond::ZERO,
                 noise_deviation: RadiansPerSecond::ZERO,
@@ -136,10 +178,10 @@ impl World {
 }
 
 impl Scenario {
-    /// The scenario of this name.
+    /// The scenario or trial of this name.
     #[must_use]
     pub fn find(name: &str) -> Option<&'static Self> {
-        SCENARIOS.iter().find(|scenario| scenario.name == name)
+        SCENARIOS.iter().chain(TRIALS).find(|scenario| scenario.name == name)
     }
 
     /// The robot and its links in a run with this seed.
@@ -160,7 +202,7 @@ mod tests {
     #[test]
     fn every_scenario_is_a_world_that_can_be_and_one_of_its_own() {
         let mut worlds: Vec<World> = Vec::new();
-        for scenario in SCENARIOS {
+        for scenario in SCENARIOS.iter().chain(TRIALS) {
             for seed in [1, 2, 3] {
                 let world = scenario.world(seed);
                 assert!(Emulator::new(world.robot).is_ok(), "{}", scenario.name);

@@ -14,6 +14,8 @@ pub struct Knob {
     pub field: &'static str,
     /// The least and the largest value that is tried.
     pub range: (f64, f64),
+    /// The value that was set by hand, where every search begins.
+    pub hand: f64,
 }
 
 /// The correctors of the tournament: each is one line, with the parameters that may be tuned.
@@ -29,17 +31,24 @@ pub fn seats() -> Vec<Seat> {
     ]
 }
 
-const D: &[Knob] = &[knob("pole", 0.3, 0.92), knob("lead", 0.0, 0.2)];
+/// With a pole below 0.6 the D-corrector does not settle in the closed loops with two periods of delay and slow motors.
+const D: &[Knob] = &[knob("pole", (0.6, 0.92), 0.7), LEAD];
 const G: &[Knob] =
-    &[knob("ratio.proportional", 0.0, 1.0), knob("ratio.integral", 0.5, 15.0), knob("lead", 0.0, 0.2)];
-const W: &[Knob] = &[knob("pull", 1.0, 12.0), knob("turning", 1.0, 10.0), knob("lead", 0.0, 0.2)];
-const ARC: &[Knob] = &[knob("sharpening", 1.0, 9.0), knob("hump", 0.05, 0.6), knob("lead", 0.0, 0.2)];
-const PURSUIT: &[Knob] = &[knob("lookahead", 0.2, 1.5), knob("nearest", 0.05, 0.3), knob("lead", 0.0, 0.2)];
-const LTV: &[Knob] =
-    &[knob("along", 0.01, 0.5), knob("aside", 0.01, 0.5), knob("heading", 0.05, 2.0), knob("lead", 0.0, 0.2)];
+    &[knob("ratio.proportional", (0.0, 1.0), 0.1), knob("ratio.integral", (0.5, 15.0), 5.0), LEAD];
+const W: &[Knob] = &[knob("pull", (1.0, 12.0), 5.0), knob("turning", (1.0, 10.0), 4.0), LEAD];
+const ARC: &[Knob] = &[knob("sharpening", (1.0, 9.0), 3.0), knob("hump", (0.05, 0.6), 0.25), LEAD];
+/// A lookahead of less than 0.3 s is too short for beats of 0.2 s.
+const PURSUIT: &[Knob] = &[knob("lookahead", (0.3, 1.5), 0.5), knob("nearest", (0.05, 0.3), 0.12), LEAD];
+const LTV: &[Knob] = &[
+    knob("along", (0.01, 0.5), 0.06),
+    knob("aside", (0.01, 0.5), 0.06),
+    knob("heading", (0.05, 2.0), 0.4),
+    LEAD,
+];
+const LEAD: Knob = knob("lead", (0.0, 0.2), 0.06);
 
-const fn knob(field: &'static str, low: f64, high: f64) -> Knob {
-    Knob { field, range: (low, high) }
+const fn knob(field: &'static str, range: (f64, f64), hand: f64) -> Knob {
+    Knob { field, range, hand }
 }
 
 /// A kind of plan that a course can be told as.
@@ -62,10 +71,15 @@ impl Told for Plan {
 pub trait Running {
     /// One beat.
     fn step(&mut self, seen: &Seen) -> Step;
+    /// Goes on after the gate had taken the wheels back.
+    fn resume(&mut self, seen: &Seen, pause: Seconds);
 }
 impl<C: Corrector> Running for C {
     fn step(&mut self, seen: &Seen) -> Step {
         Corrector::step(self, seen)
+    }
+    fn resume(&mut self, seen: &Seen, pause: Seconds) {
+        Corrector::resume(self, seen, pause);
     }
 }
 
@@ -137,6 +151,15 @@ impl Seat {
         (self.tune)(values)
     }
 
+    /// The same corrector with the values that were set by hand.
+    ///
+    /// # Errors
+    /// None in fact: those are within the bounds of its parameters.
+    pub fn by_hand(&self) -> Result<Self, Refusal> {
+        let values: Vec<f64> = self.knobs.iter().map(|knob| knob.hand).collect();
+        self.tuned(&values)
+    }
+
     /// The values of its knobs.
     #[must_use]
     pub fn values(&self) -> Vec<f64> {
@@ -175,7 +198,7 @@ mod tests {
             for (knob, value) in seat.knobs.iter().zip(&values) {
                 assert!((knob.range.0..=knob.range.1).contains(value), "{}: {knob:?} is {value}", seat.name);
             }
-            for end in [|knob: &Knob| knob.range.0, |knob: &Knob| knob.range.1] {
+            for end in [|knob: &Knob| knob.range.0, |knob: &Knob| knob.range.1, |knob: &Knob| knob.hand] {
                 let values: Vec<f64> = seat.knobs.iter().map(end).collect();
                 let tuned = seat.tuned(&values).expect("the ends of the ranges are allowed");
                 assert_eq!(tuned.values(), values);

@@ -6,7 +6,7 @@ use axle_schema::{Geometry, Leg, MetresPerSecond, Pose, RadiansPerSecond, Twist}
 
 /// What the rule says to a robot at `pose` on this geometry, at 0.4 m/s.
 fn steer(geometry: Geometry, pose: Pose) -> Aim {
-    let params = PursuitParams::default();
+    let params = PursuitParams { lookahead: Seconds(0.5), nearest: Metres(0.12), ..PursuitParams::default() };
     let limits = Limits { robot: params.robot, effort: 1.0, turn: f64::INFINITY };
     let leg = Leg { geometry, point: 0, speed: None };
     let path = Path::begin(Pose::default(), &leg, &limits).expect("a path");

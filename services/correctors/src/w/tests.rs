@@ -52,9 +52,9 @@ fn the_field_of_points_leads_to_the_point_and_is_slow_at_both_ends() {
 
 #[test]
 fn the_field_of_a_path_leads_back_to_it_and_along_it() {
-    let flow = |geometry, x, y| {
-        at(geometry, Pose::new(x, y, 0.0), REST, |way| field::path::flow(&WParams::default(), way))
-    };
+    let params = WParams { pull: PerMetre(5.0), ..WParams::default() };
+    let flow =
+        |geometry, x, y| at(geometry, Pose::new(x, y, 0.0), REST, |way| field::path::flow(&params, way));
     assert!(flow(LINE, 1.0, 0.0).psi.abs() < 1e-12);
     assert!((flow(LINE, 1.0, 0.2).psi + FRAC_PI_2 / 2.0).abs() < 1e-12, "5 1/m: 45 degrees at 0.2 m");
     let arc = Geometry::Arc { radius: Metres(0.5), angle: Radians(3.0) };

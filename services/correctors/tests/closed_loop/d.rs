@@ -18,7 +18,8 @@ fn course(params: &DParams, plant: Plant, typed: &str) -> (Course, f64) {
 fn reached((course, duration): &(Course, f64), worst: f64, what: &str) {
     assert!(course.result.is_ok(), "{what}: {course:?}");
     assert!(course.end <= 0.0021 && course.worst < worst, "{what}: {course:?}");
-    assert!(course.reversals <= 1 && course.time - duration < 2.0, "{what}: {course:?}");
+    // A wheel that has gone back for a millimetre rests for a second before it goes back again.
+    assert!(course.reversals <= 1 && course.time - duration < 3.0, "{what}: {course:?}");
 }
 
 #[test]

@@ -7,7 +7,7 @@ use axle_correctors::{
     ArcCorrector, ArcParams, DCorrector, DParams, GCorrector, GParams, LtvCorrector, LtvParams,
     PursuitCorrector, PursuitParams, WCorrector, WParams,
 };
-use axle_schema::contract::{Corrector, Seen, Step};
+use axle_schema::contract::{Corrector, Params, Seen, Step};
 use axle_schema::{
     Drivetrain, Dwm, EncodersData, InertialData, Metres, MetresPerSecond, NavigatorData, Plan, Pose,
     RadiansPerSecond, Refusal, Seconds, Sides, Task, TaskId,
@@ -48,12 +48,17 @@ fn begin<C: Corrector>(params: &C::Params, plan: C::Plan, seen: &Seen) -> Result
     C::begin(params, Seconds(0.05), Task { id: TaskId(1), plan }, seen)
 }
 
-/// Every command goes on from the last one, is finite and within the limits, until the task is over.
+/// Every command of a corrector with these parameters is bounded.
 fn obeys<C: Corrector>(params: &C::Params, plan: C::Plan, beats: &[Beat]) {
+    let corrector: C = begin(params, plan, &seen(0.0, 0.0, [0.0; 6])).expect("a plan that can be followed");
+    is_bounded(corrector, beats);
+}
+
+/// Every command goes on from the last one, is finite and within the limits, until the task is over.
+fn is_bounded<C: Corrector>(mut corrector: C, beats: &[Beat]) {
     let robot = Drivetrain::default();
     let mut last = Sides::<MetresPerSecond>::default();
     let (mut at, mut sums) = (0.0, [0.0; 6]);
-    let mut corrector: C = begin(params, plan, &seen(0.0, 0.0, sums)).expect("a plan that can be followed");
     for (index, beat) in beats.iter().enumerate() {
         // A broken number is measured once; what is measured next goes on from before it.
         let numbers = std::array::from_fn(|n| sums[n] + beat.numbers[n]);
@@ -76,7 +81,8 @@ fn obeys<C: Corrector>(params: &C::Params, plan: C::Plan, beats: &[Beat]) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 192, failure_persistence: None, ..ProptestConfig::default() })]
+    // `PROPTEST_CASES=20000` looks longer; 256 are the default.
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn no_measurement_leads_to_a_wild_command(beats in beats()) {
@@ -91,6 +97,72 @@ proptest! {
         }
         obeys::<ArcCorrector>(&ArcParams::default(), path.clone(), &beats);
         obeys::<PursuitCorrector>(&PursuitParams::default(), path, &beats);
+    }
+}
+
+/// What becomes of the numbers of some parameters: most are left or scaled, a few are what no gain should be.
+fn wild() -> impl Strategy<Value = Vec<Option<Wild>>> {
+    let odd = [0.0, -1.0, -1e-12, 1e-300, 1e9, f64::MAX, f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
+    let change = prop_oneof![
+        (-2.0..2.0).prop_map(|power: f64| Wild::Times(10_f64.powf(power))),
+        proptest::sample::select(odd.to_vec()).prop_map(Wild::Is),
+    ];
+    proptest::collection::vec(proptest::option::weighted(0.15, change), 24)
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Wild {
+    Times(f64),
+    Is(f64),
+}
+
+/// Parameters with other numbers, but those of the robot, whose limits are what commands are judged by.
+fn spoilt<P: Params>(wild: &[Option<Wild>]) -> Option<P> {
+    fn spoil(table: &mut toml::Table, wild: &mut dyn Iterator<Item = Option<Wild>>) {
+        for (name, value) in table.iter_mut() {
+            match value {
+                toml::Value::Float(number) => match wild.next().flatten() {
+                    Some(Wild::Times(factor)) => *number *= factor,
+                    Some(Wild::Is(odd)) => *number = odd,
+                    None => {}
+                },
+                toml::Value::Table(inner) if name != "robot" => spoil(inner, wild),
+                _ => {}
+            }
+        }
+    }
+    let mut table = toml::Table::try_from(P::default()).expect("parameters are a table");
+    spoil(&mut table, &mut wild.iter().copied().cycle());
+    table.try_into().ok()
+}
+
+/// Wild parameters are refused, or lead to commands that are bounded all the same; says whether they were refused.
+fn bears<C: Corrector>(wild: &[Option<Wild>], plan: C::Plan, beats: &[Beat]) -> bool {
+    let Some(params) = spoilt::<C::Params>(wild) else { return true };
+    let begun: Result<C, Refusal> = begin(&params, plan, &seen(0.0, 0.0, [0.0; 6]));
+    let Ok(corrector) = begun else { return true };
+    is_bounded(corrector, beats);
+    false
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn wild_parameters_are_refused_or_lead_to_no_wild_command(wild in wild(), beats in beats()) {
+        let path = plan(&[turn(0.5), line(1.0), arc(0.5, 1.5), line(-0.2)]);
+        let refused = [
+            bears::<DCorrector>(&wild, drive(&path), &beats),
+            bears::<LtvCorrector>(&wild, drive(&path), &beats),
+            bears::<GCorrector>(&wild, path.clone(), &beats),
+            bears::<WCorrector>(&wild, path.clone(), &beats),
+            bears::<ArcCorrector>(&wild, path.clone(), &beats),
+            bears::<PursuitCorrector>(&wild, path, &beats),
+        ];
+        // What is no number or below nothing is no value of any parameter.
+        if wild.iter().take(8).flatten().any(|wild| matches!(wild, Wild::Is(odd) if odd.is_nan() || *odd <= -1.0)) {
+            prop_assert_eq!(refused, [true; 6]);
+        }
     }
 }
 

@@ -113,12 +113,12 @@ pub(crate) fn arc(radius: f64, angle: f64) -> Geometry {
 /// The plan of a typed way, by the service that makes it.
 pub(crate) fn way(way: &str) -> Plan {
     let way = WayTask::parse(way).expect("a way");
-    Pathfinder::answer(&PathfinderParams::default(), &PlanAsk { way, start: None }).expect("a plan")
+    Pathfinder::answer(&PathfinderParams::default(), &PlanAsk { way, ..PlanAsk::default() }).expect("a plan")
 }
 
 /// The drive of a plan, by the service that makes it.
 pub(crate) fn drive(plan: &Plan) -> Drive {
-    let ask = DriveAsk { legs: plan.legs.clone(), speeds: None, robot: None };
+    let ask = DriveAsk { legs: plan.legs.clone(), speeds: None, robot: None, manner: None };
     Pathdriver::answer(&PathdriverParams::default(), &ask).expect("a drive")
 }
 
