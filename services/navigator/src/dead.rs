@@ -4,13 +4,13 @@
 //! then are kept, and its uncertainty grows along them anew.
 
 use crate::accelerated::Accelerated;
-use crate::measurement::{Position, map_to_odom};
+use crate::measurement::{map_to_odom, position};
 use crate::params::{Method, NavigatorParams};
 use crate::reckoning::{Reckoning, Step, row_by_row};
 use crate::ticks::Ticks;
 use crate::{arc, half_turn, point_and_shoot};
 use axle_schema::series::Datum as _;
-use axle_schema::{EncodersData, Metres, NavigatorData, Numbers, Pose, Radians, Twist};
+use axle_schema::{EncodersData, Metres, NavigatorData, Numbers, Pose, Position, Radians, Twist};
 use nalgebra::Matrix3;
 use std::collections::VecDeque;
 
@@ -22,6 +22,19 @@ enum Kind {
     Simple(Step, Reckoning),
     Accelerated(Accelerated),
     Ticks(Ticks),
+}
+
+impl Kind {
+    fn new(method: Method, start: &Reckoning) -> Self {
+        let start = start.clone();
+        match method {
+            Method::PointAndShoot => Self::Simple(point_and_shoot::STEP, start),
+            Method::HalfTurn => Self::Simple(half_turn::STEP, start),
+            Method::Accelerated => Self::Accelerated(Accelerated::new(start)),
+            Method::Ticks => Self::Ticks(Ticks::new(start)),
+            Method::Arc | Method::Ekf => Self::Simple(arc::STEP, start),
+        }
+    }
 }
 
 /// A method of dead reckoning with its memory.
@@ -44,15 +57,8 @@ pub(crate) struct Dead {
 impl Dead {
     pub(crate) fn new(params: &NavigatorParams) -> Self {
         let start = Reckoning::new(params.start, Matrix3::zeros());
-        let kind = match params.method {
-            Method::PointAndShoot => Kind::Simple(point_and_shoot::STEP, start.clone()),
-            Method::HalfTurn => Kind::Simple(half_turn::STEP, start.clone()),
-            Method::Accelerated => Kind::Accelerated(Accelerated::new(start.clone())),
-            Method::Ticks => Kind::Ticks(Ticks::new(start.clone())),
-            Method::Arc | Method::Ekf => Kind::Simple(arc::STEP, start.clone()),
-        };
         Self {
-            kind,
+            kind: Kind::new(params.method, &start),
             track: params.robot.track.get(),
             k: params.k,
             window: params.ekf.window.0,
@@ -61,6 +67,15 @@ impl Dead {
             origin: Pose::default(),
             twist: None,
         }
+    }
+
+    /// Goes on from where another one was.
+    pub(crate) fn resume(&mut self, params: &NavigatorParams, from: &Position) {
+        let covariance = |p: &Numbers<9>| Matrix3::from_row_slice(&p.0);
+        let odom = from.odom.covariance.as_ref().map_or_else(Matrix3::zeros, covariance);
+        self.kind = Kind::new(params.method, &Reckoning::new(from.odom.pose, odom));
+        self.map = Reckoning::new(from.map, covariance(&from.map_covariance));
+        self.origin = from.map_to_odom;
     }
 
     /// Motion counts from this reading.
@@ -119,8 +134,9 @@ impl Dead {
     }
 
     pub(crate) fn position(&self) -> Option<Position> {
+        let (wheels, ..) = self.log.back()?;
         let odom = self.data()?;
-        Some(Position::new(odom, self.in_map(odom.pose), row_by_row(&self.map.covariance())))
+        Some(position(*wheels, odom, self.in_map(odom.pose), row_by_row(&self.map.covariance())))
     }
 
     /// The poses at a stamp, in `odom` and in `map`.

@@ -1,4 +1,4 @@
-//! The method "ekf": a Kalman filter of encoders, gyro, fixes and ranges (model.md 6).
+//! The method "ekf": a Kalman filter of encoders, gyro, accelerometer, fixes and ranges (model.md 6).
 //!
 //! Encoders set the pace. Every reading of the last seconds is a node with the filters of its instant; a measurement
 //! that comes late, or out of order, is put in its place, and what came after it is reckoned again. One that is ahead
@@ -10,19 +10,18 @@
 //! [`seed`]). A slipping wheel loses its weight, a gyro in degrees is left out; both are said.
 
 mod filter;
-mod gyro;
+mod means;
 mod seed;
 mod timeline;
 mod watch;
 
-use crate::event::{Event, Sensor};
-use crate::measurement::{Counts, Position, Range};
+use crate::measurement::{Counts, position};
 use crate::navigator::Innovation;
 use crate::params::NavigatorParams;
 use crate::reckoning::row_by_row;
 use axle_schema::{
-    EncodersData, Fix, InertialData, Metres, MetresPerSecond, NavigatorData, Numbers, Pose, RadiansPerSecond,
-    Seconds, Twist,
+    EncodersData, Event, Fix, InertialData, Metres, MetresPerSecond, NavigatorData, Numbers, Pose, Position,
+    RadiansPerSecond, Range, Seconds, Twist,
 };
 use filter::{Filter, Noise};
 use nalgebra::Matrix3;
@@ -62,8 +61,11 @@ impl Ekf {
         let noise = Noise {
             track: params.robot.track.get(),
             k: params.k.0,
+            wheel: params.ekf.wheel_noise.powi(2),
+            tick: params.tick.0,
             gyro: params.ekf.gyro_noise.powi(2),
             bias: params.ekf.bias_walk.powi(2),
+            push: params.ekf.accelerometer_noise.powi(2),
         };
         let odom = Filter::new(params.start, &Matrix3::zeros(), &params.ekf);
         let map = Filter::new(params.start, &covariance, &params.ekf);
@@ -79,6 +81,17 @@ impl Ekf {
         }
     }
 
+    /// Goes on from where another one was; nothing is known of its bias and of the measures of the robot.
+    pub(crate) fn resume(&mut self, from: &Position) {
+        let covariance = |p: &Numbers<9>| Matrix3::from_row_slice(&p.0);
+        let map = covariance(&from.map_covariance);
+        self.timeline.resume(
+            (from.odom.pose, &from.odom.covariance.as_ref().map_or_else(Matrix3::zeros, covariance)),
+            (from.map, &map),
+        );
+        self.seeking = map[(2, 2)] >= UNKNOWN * UNKNOWN;
+    }
+
     /// A new anchor: nothing is known of the motion before it, and no earlier stamp can be put in order with it.
     pub(crate) fn restart(&mut self, datum: &EncodersData) {
         self.timeline.restart(datum);
@@ -87,16 +100,12 @@ impl Ekf {
 
     /// The next reading, or one that is put between others; false if it has no place.
     pub(crate) fn encoders(&mut self, datum: &EncodersData, counts: &mut Counts) -> bool {
-        let said = self.watch.hear(Sensor::Encoders, datum.stamp.0, self.params.ekf.silence.0);
-        self.events.extend(said);
         let taken = self.timeline.encoders(datum, &mut self.watch, counts);
         self.settle(counts);
         taken
     }
 
     pub(crate) fn inertial(&mut self, data: &InertialData, counts: &mut Counts) {
-        let said = self.watch.hear(Sensor::Gyro, data.stamp.0, self.params.ekf.silence.0);
-        self.events.extend(said);
         if !self.timeline.inertial(data, &mut self.watch, counts) {
             counts.stale += 1;
         }
@@ -234,7 +243,7 @@ impl Ekf {
 
     pub(crate) fn position(&self) -> Option<Position> {
         let node = self.timeline.newest()?;
-        Some(Position::new(self.data()?, node.map.pose(), row_by_row(&node.map.covariance())))
+        Some(position(node.reading, self.data()?, node.map.pose(), row_by_row(&node.map.covariance())))
     }
 
     /// The poses at a stamp within the window, in `odom` and in `map`.
@@ -244,7 +253,6 @@ impl Ekf {
 
     /// Bias of the gyro in rad/s, and the relative errors of left radius, right radius and track.
     pub(crate) fn measures(&self) -> Option<[f64; 4]> {
-        let x = &self.timeline.newest()?.map.x;
-        Some([x[3], x[4], x[5], x[6]])
+        Some(self.timeline.newest()?.map.learned())
     }
 }

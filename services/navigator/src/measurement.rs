@@ -1,21 +1,6 @@
 //! What a navigator can measure by, and what it says of itself beside the pose.
 
-use axle_schema::{EncodersData, Fix, InertialData, Metres, NavigatorData, Numbers, Pose, Seconds};
-
-/// The distance to a known point, such as an ultra-wideband anchor.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Range {
-    /// Seconds since the boot of the robot process.
-    pub stamp: Seconds,
-    /// The point's position along x, in `map`.
-    pub x: Metres,
-    /// The point's position along y, in `map`.
-    pub y: Metres,
-    /// How far it is from the middle of the axle.
-    pub distance: Metres,
-    /// Standard deviation of the distance.
-    pub sd: Metres,
-}
+use axle_schema::{EncodersData, Fix, InertialData, NavigatorData, Numbers, Pose, Position, Range, Seconds};
 
 /// Anything that tells of where the robot is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,7 +34,9 @@ impl Measurement {
         near(&[self.stamp().0])
             && match self {
                 Self::Encoders(data) => near(&[data.left.0, data.right.0]),
-                Self::Inertial(data) => near(&[data.gyro.0, data.ax.map_or(0.0, |a| a.0)]),
+                Self::Inertial(data) => {
+                    near(&[data.gyro.0, data.ax.map_or(0.0, |a| a.0), data.ay.map_or(0.0, |a| a.0)])
+                }
                 Self::Fix(Fix { x, y, covariance: Numbers([xx, xy, yx, yy]), heading, .. }) => {
                     let heading = heading.is_none_or(|heading| {
                         near(&[heading.angle.0, heading.variance]) && heading.variance > 0.0
@@ -67,23 +54,21 @@ impl Measurement {
     }
 }
 
-/// Where the robot is in both frames of REP-105.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Position {
-    /// Pose, twist and covariance in `odom`, which is continuous and drifts.
-    pub odom: NavigatorData,
-    /// The pose in `map`, which does not drift and jumps with each fix.
-    pub map: Pose,
-    /// Covariance of (x, y, heading) in `map`, row by row.
-    pub map_covariance: Numbers<9>,
-    /// Where the origin of `odom` is in `map`; fixes move it.
-    pub map_to_odom: Pose,
-}
-
-impl Position {
-    /// From the poses of the same instant in both frames.
-    pub(crate) fn new(odom: NavigatorData, map: Pose, map_covariance: [f64; 9]) -> Self {
-        Self { odom, map, map_covariance: Numbers(map_covariance), map_to_odom: map_to_odom(map, odom.pose) }
+/// From the poses of the same instant in both frames. Whose clock it is by, only the process knows.
+pub(crate) fn position(
+    wheels: EncodersData,
+    odom: NavigatorData,
+    map: Pose,
+    map_covariance: [f64; 9],
+) -> Position {
+    let map_to_odom = map_to_odom(map, odom.pose);
+    Position {
+        wheels,
+        odom,
+        map,
+        map_covariance: Numbers(map_covariance),
+        map_to_odom,
+        ..Position::default()
     }
 }
 

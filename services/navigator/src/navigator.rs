@@ -1,22 +1,28 @@
 //! The service as a value: checks what it hears, and asks the method.
 
+mod reference;
+
 use crate::dead::Dead;
 use crate::ekf::Ekf;
-use crate::event::Event;
-use crate::measurement::{Counts, Measurement, Position};
+use crate::measurement::{Counts, Measurement};
 use crate::params::{Method, NavigatorParams};
+use crate::silence::Silence;
 use axle_schema::contract::Bounds as _;
-use axle_schema::refusal::within;
+use axle_schema::event::{Event, Sensor};
 use axle_schema::series::Datum as _;
+use axle_schema::window::Window;
 use axle_schema::{
-    EncodersData, EncodersSpan, Fix, NavigatorData, Numbers, Pose, RadiansPerSecond, Refusal, Seconds, Twist,
+    Boot, EncodersData, EncodersSpan, InertialData, Message as _, NavigatorData, Pose, Position,
+    RadiansPerSecond, Refusal, Seconds, Twist,
 };
-use nalgebra::Matrix3;
+use reference::covariance;
 
 /// A stamp that goes back by more than this, in s, is of a robot that has restarted; by less, of an old reading.
 const RESTART: f64 = 1.0;
 /// A stamp that jumps ahead by more than this, in s, is of another clock.
 const LEAP: f64 = 600.0;
+/// Readings of a gyro so long before a position may be about the time after it.
+const OVERLAP: Seconds = Seconds(0.5);
 /// How many times its largest speed a wheel is believed, since a description of a robot is never exact.
 const BELIEF: f64 = 1.5;
 
@@ -42,7 +48,15 @@ pub struct Innovation {
 pub struct Navigator {
     params: NavigatorParams,
     keeper: Keeper,
+    /// Beside dead reckoning: a filter that only watches, as soon as there is a gyro.
+    guard: Option<Box<Ekf>>,
     last: Option<EncodersData>,
+    /// The run of the robot whose windows were heard.
+    boot: Option<Boot>,
+    /// Whether the next reading is of another run of the robot.
+    anew: bool,
+    silence: Silence,
+    noticed: Vec<Event>,
     counts: Counts,
 }
 
@@ -58,7 +72,61 @@ impl Navigator {
         } else {
             Keeper::Dead(Box::new(Dead::new(&params)))
         };
-        Ok(Self { params, keeper, last: None, counts: Counts::default() })
+        Ok(Self {
+            params,
+            keeper,
+            guard: None,
+            last: None,
+            boot: None,
+            anew: false,
+            silence: Silence::default(),
+            noticed: Vec::new(),
+            counts: Counts::default(),
+        })
+    }
+
+    /// A navigator that goes on from where another one was, which ended in the same run of the robot, with what was measured
+    /// since then. What the wheels have covered before the first reading of it is the first span.
+    ///
+    /// # Errors
+    /// As [`Navigator::new`]; and for a position that no navigator has said.
+    pub fn resume(params: NavigatorParams, from: &Position, since: &Window) -> Result<Self, Refusal> {
+        from.check()?;
+        covariance(&from.map_covariance)?;
+        from.odom.covariance.as_ref().map_or(Ok(()), |p| covariance(p).map(drop))?;
+        let mut navigator = Self { boot: Some(from.boot), ..Self::new(params)? };
+        match &mut navigator.keeper {
+            Keeper::Dead(dead) => dead.resume(&navigator.params, from),
+            Keeper::Ekf(ekf) => ekf.resume(from),
+        }
+        let _ = navigator.take(from.wheels);
+        // What is older has been counted. A gyro's reading reaches into the time after the position.
+        let begin = from.wheels.stamp;
+        let mut since = since.clone();
+        since.encoders.retain(|datum| datum.stamp > begin);
+        since.inertial.retain(|datum| datum.stamp > begin - OVERLAP);
+        since.fixes.retain(|datum| datum.stamp > begin);
+        since.ranges.retain(|datum| datum.stamp > begin);
+        let _ = navigator.hear(&since);
+        Ok(navigator)
+    }
+
+    /// Takes all measurements of a window; says the newest pose, if it says anything new. What a window repeats is known by
+    /// its stamp, and counts once. In another run of the robot motion counts from the first reading.
+    pub fn hear(&mut self, window: &Window) -> Option<NavigatorData> {
+        self.anew |= self.boot.replace(window.boot).is_some_and(|boot| boot != window.boot);
+        let inertial = window.inertial.iter().copied().map(Measurement::Inertial);
+        let fixes = window.fixes.iter().copied().map(Measurement::Fix);
+        let ranges = window.ranges.iter().copied().map(Measurement::Range);
+        for measurement in inertial.chain(fixes).chain(ranges) {
+            let _ = self.measure(&measurement);
+        }
+        // Beside a reading of now an old one is old, however old it is, and no restart.
+        let newest = window.encoders.iter().map(|datum| datum.stamp.0).fold(f64::NEG_INFINITY, f64::max);
+        let oldest = self.last.map(|last| last.stamp - Seconds(RESTART));
+        let oldest = oldest.filter(|oldest| !self.anew && newest > oldest.0);
+        let fresh = window.encoders.iter().filter(|datum| oldest.is_none_or(|oldest| datum.stamp > oldest));
+        fresh.filter_map(|&datum| self.take(datum)).last()
     }
 
     /// Takes the next measurement; says the pose after encoder readings, or nothing for whatever is dropped or waits.
@@ -71,7 +139,7 @@ impl Navigator {
         }
         match (measurement, &mut self.keeper) {
             (Measurement::Encoders(datum), _) => return self.take(*datum),
-            (Measurement::Inertial(data), Keeper::Ekf(ekf)) => ekf.inertial(data, &mut self.counts),
+            (Measurement::Inertial(data), _) => self.feel(data),
             (Measurement::Fix(fix), Keeper::Ekf(ekf)) => ekf.fix(fix, &mut self.counts),
             (Measurement::Range(range), Keeper::Ekf(ekf)) => ekf.range(range, &mut self.counts),
             (Measurement::Fix(fix), Keeper::Dead(_)) if self.params.method == Method::Ticks => {
@@ -80,6 +148,19 @@ impl Navigator {
             (_, Keeper::Dead(_)) => {}
         }
         None
+    }
+
+    fn feel(&mut self, data: &InertialData) {
+        let missed = self.silence.hear(Sensor::Gyro, data.stamp.0, self.params.silence.0);
+        self.noticed.extend(missed);
+        match &mut self.keeper {
+            Keeper::Ekf(ekf) => ekf.inertial(data, &mut self.counts),
+            Keeper::Dead(_) if self.params.watch => {
+                let guard = self.guard.get_or_insert_with(|| Box::new(Ekf::new(&self.params)));
+                guard.inertial(data, &mut Counts::default());
+            }
+            Keeper::Dead(_) => {}
+        }
     }
 
     /// Takes the next reading; says the pose at its stamp, or nothing for a reading that is dropped.
@@ -95,8 +176,22 @@ impl Navigator {
             Keeper::Dead(_) => RESTART,
             Keeper::Ekf(_) => RESTART.max(self.params.ekf.window.0),
         };
-        let leaps = since.is_some_and(|span| span.duration.0 < -restart || span.duration.0 > LEAP);
+        let leaps =
+            since.is_some_and(|span| self.anew || span.duration.0 < -restart || span.duration.0 > LEAP);
+        self.anew = false;
         self.counts.restarts += u64::from(leaps);
+        if leaps {
+            self.silence.restart();
+        }
+        let missed = self.silence.hear(Sensor::Encoders, datum.stamp.0, self.params.silence.0);
+        self.noticed.extend(missed);
+        if let Some(guard) = &mut self.guard {
+            if leaps {
+                guard.restart(&datum);
+            } else {
+                let _ = guard.encoders(&datum, &mut Counts::default());
+            }
+        }
         match &mut self.keeper {
             Keeper::Ekf(ekf) => {
                 if leaps {
@@ -131,62 +226,20 @@ impl Navigator {
         }
     }
 
-    /// The robot was at `pose` in `map` at `stamp`: an absolute reference, such as a person's word or a docking station.
-    /// Uncertainty restarts with `covariance` of (x, y, heading), row by row, and measurements before it are obsolete.
-    /// `odom` goes on as before.
-    ///
-    /// # Errors
-    /// Refuses a pose that no robot has, a covariance that is none, and a stamp that the memory does not reach.
-    pub fn set_position(
-        &mut self,
-        stamp: Seconds,
-        pose: Pose,
-        covariance: &Numbers<9>,
-    ) -> Result<(), Refusal> {
-        pose.check()?;
-        within("stamp in s", stamp.0, -1e9, 1e9)?;
-        let p = Matrix3::from_row_slice(&covariance.0);
-        let p = (p + p.transpose()) / 2.0;
-        for (name, index) in [("x", 0), ("y", 1), ("heading", 2)] {
-            within(&format!("variance of {name}"), p[(index, index)], 0.0, 1e9)?;
-        }
-        // The eigenvalues of a matrix with NaN would be sought for ever.
-        if !p.iter().all(|value| value.is_finite()) || p.symmetric_eigenvalues().min() < -1e-9 * p.amax() {
-            return Err(Refusal::malformed("covariance", "it is not positive semidefinite"));
-        }
-        let is_set = match &mut self.keeper {
-            Keeper::Dead(dead) => dead.set(stamp.0, pose, &p),
-            Keeper::Ekf(ekf) => ekf.set(stamp.0, pose, &p),
-        };
-        if is_set {
-            Ok(())
-        } else {
-            Err(Refusal::out_of_range("stamp of the position", stamp, "a stamp of the last seconds"))
-        }
-    }
-
-    /// A fix resets the position of the warehouse's method; the heading too where the fix knows it.
-    fn reset(&mut self, fix: &Fix) {
-        let Keeper::Dead(dead) = &mut self.keeper else { return };
-        let p = dead.position().map_or([0.0; 9], |position| position.map_covariance.0);
-        let Numbers([xx, xy, _, yy]) = fix.covariance;
-        let heading = fix.heading.map_or_else(
-            || (dead.poses_at(fix.stamp.0).map_or(self.params.start, |(_, map)| map).heading, p[8]),
-            |heading| (heading.angle, heading.variance),
-        );
-        let covariance = Matrix3::new(xx, xy, 0.0, xy, yy, 0.0, 0.0, 0.0, heading.1);
-        if !dead.set(fix.stamp.0, Pose { x: fix.x, y: fix.y, heading: heading.0 }, &covariance) {
-            self.counts.stale += 1;
-        }
+    /// Nothing was heard for `elapsed` of whatever clock; the encoders, which set the pace, may be missed.
+    pub fn wait(&mut self, elapsed: Seconds) {
+        let missed = self.silence.wait(elapsed.0, self.params.silence.0);
+        self.noticed.extend(missed);
     }
 
     /// Where the robot is in both frames; nothing before the first reading.
     #[must_use]
     pub fn position(&self) -> Option<Position> {
-        match &self.keeper {
+        let position = match &self.keeper {
             Keeper::Dead(dead) => dead.position(),
             Keeper::Ekf(ekf) => ekf.position(),
-        }
+        };
+        position.map(|position| Position { boot: self.boot.unwrap_or_default(), ..position })
     }
 
     /// Where the robot was in `odom` and in `map`, at a stamp of the last seconds; before them and after them it is where it
@@ -201,10 +254,14 @@ impl Navigator {
 
     /// What was noticed since the last call.
     pub fn events(&mut self) -> Vec<Event> {
-        match &mut self.keeper {
-            Keeper::Dead(_) => Vec::new(),
-            Keeper::Ekf(ekf) => ekf.events(),
+        let mut events = std::mem::take(&mut self.noticed);
+        if let Keeper::Ekf(ekf) = &mut self.keeper {
+            events.append(&mut ekf.events());
         }
+        if let Some(guard) = &mut self.guard {
+            events.append(&mut guard.events());
+        }
+        events
     }
 
     /// What the fixes and ranges since the last call thought of the pose.
@@ -222,6 +279,18 @@ impl Navigator {
             Keeper::Dead(_) => None,
             Keeper::Ekf(ekf) => ekf.measures(),
         }
+    }
+
+    /// Whether the robot is to stop at this event.
+    #[must_use]
+    pub fn stops(&self, event: &Event) -> bool {
+        self.params.stop.iter().any(|name| name == event.name())
+    }
+
+    /// The newest stamp of the encoders.
+    #[must_use]
+    pub fn newest(&self) -> Option<Seconds> {
+        self.last.map(|last| last.stamp)
     }
 
     /// How often a measurement was not simply the next one.
@@ -246,97 +315,4 @@ fn twist(params: &NavigatorParams, span: &EncodersSpan) -> Option<Twist> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use axle_schema::Metres;
-    use axle_schema::contract::Params as _;
-    use axle_schema::{Message as _, MetresPerSecond};
-
-    fn at(stamp: f64, left: f64, right: f64) -> EncodersData {
-        EncodersData { stamp: Seconds(stamp), left: Metres(left), right: Metres(right) }
-    }
-    fn navigator() -> Navigator {
-        Navigator::new(NavigatorParams::default()).expect("the defaults are within their ranges")
-    }
-
-    #[test]
-    fn the_parameter_file_holds_the_defaults() {
-        let read: NavigatorParams = toml::from_str(NavigatorParams::FILE).expect("the file is valid");
-        assert_eq!(read, NavigatorParams::default());
-        let written = toml::Table::try_from(NavigatorParams::default()).expect("parameters are a table");
-        let table: toml::Table = toml::from_str(NavigatorParams::FILE).expect("the file is a table");
-        assert_eq!(table, written, "the file lists every field");
-        let wrong = NavigatorParams { k: Metres(f64::NAN), ..NavigatorParams::default() };
-        assert!(Navigator::new(wrong).expect_err("NaN is no noise").to_string().contains("k in m"));
-    }
-
-    #[test]
-    fn the_first_reading_is_the_anchor() {
-        let start = Pose::new(1.0, 2.0, 0.5);
-        let mut navigator =
-            Navigator::new(NavigatorParams { start, ..NavigatorParams::default() }).expect("valid");
-        let first = navigator.take(at(7.0, 100.0, -30.0)).expect("a first pose");
-        assert_eq!((first.pose, first.stamp, first.twist), (start, Seconds(7.0), None));
-        assert_eq!(first.covariance, Some(Numbers([0.0; 9])));
-    }
-
-    #[test]
-    fn a_quarter_of_a_circle_ends_where_the_arithmetic_says() {
-        // Radius 0.5 m, 90 degrees to the left, track 0.3 m: wheels on 0.35 m and 0.65 m, in 20 readings of 0.1 s.
-        let mut navigator = navigator();
-        let mut last = None;
-        for n in 0..=20 {
-            let angle = f64::from(n) / 20.0 * std::f64::consts::FRAC_PI_2;
-            last = navigator.take(at(f64::from(n) * 0.1, 0.35 * angle, 0.65 * angle));
-        }
-        let last = last.expect("a pose");
-        assert!(
-            (last.pose.x.0 - 0.5).abs() < 1e-12 && (last.pose.y.0 - 0.5).abs() < 1e-12,
-            "{:?}",
-            last.pose
-        );
-        let twist = last.twist.expect("a twist");
-        let rate = std::f64::consts::FRAC_PI_2 / 2.0;
-        assert!((twist.omega.0 - rate).abs() < 1e-9 && (twist.v.0 - 0.5 * rate).abs() < 1e-9, "{twist:?}");
-        assert!(last.check().is_ok(), "the datum may be sent");
-    }
-
-    #[test]
-    fn a_repeated_an_older_and_a_broken_reading_are_dropped_and_counted() {
-        let mut navigator = navigator();
-        assert!(navigator.take(at(5.0, 0.0, 0.0)).is_some());
-        for wrong in
-            [at(5.0, 0.01, 0.01), at(4.5, 0.01, 0.01), at(f64::NAN, 0.0, 0.0), at(6.0, f64::INFINITY, 0.0)]
-        {
-            assert_eq!(navigator.take(wrong), None, "{wrong:?}");
-        }
-        assert_eq!(navigator.counts(), Counts { stale: 4, ..Counts::default() });
-        let next = navigator.take(at(5.1, 0.02, 0.02)).expect("the next reading counts");
-        assert!((next.pose.x.0 - 0.02).abs() < 1e-15);
-    }
-
-    #[test]
-    fn a_restarted_robot_goes_on_from_where_it_was() {
-        let mut navigator = navigator();
-        let _ = navigator.take(at(100.0, 0.0, 0.0));
-        let _ = navigator.take(at(100.1, 0.05, 0.05));
-        let again = navigator.take(at(0.0, 0.0, 0.0)).expect("a new anchor");
-        assert!((again.pose.x.0 - 0.05).abs() < 1e-15 && again.twist.is_none());
-        let next = navigator.take(at(0.1, 0.01, 0.01)).expect("motion from there");
-        assert!((next.pose.x.0 - 0.06).abs() < 1e-15);
-        assert_eq!(navigator.counts(), Counts { restarts: 1, ..Counts::default() });
-    }
-
-    #[test]
-    fn a_reading_that_no_wheel_can_have_made_moves_nothing() {
-        let mut navigator = navigator();
-        let _ = navigator.take(at(0.0, 0.0, 0.0));
-        // 1.5 times 1 m/s for 0.1 s and 0.05 m are 0.2 m.
-        let jumped = navigator.take(at(0.1, 0.21, 0.0)).expect("a new anchor");
-        assert_eq!((jumped.pose, jumped.twist), (Pose::default(), None));
-        let next = navigator.take(at(0.2, 0.22, 0.01)).expect("motion from there");
-        assert!((next.pose.x.0 - 0.01).abs() < 1e-15, "{:?}", next.pose);
-        assert_eq!(next.twist.map(|twist| (twist.v - MetresPerSecond(0.1)).0.abs() < 1e-12), Some(true));
-        assert_eq!(navigator.counts(), Counts { jumps: 1, ..Counts::default() });
-    }
-}
+mod tests;

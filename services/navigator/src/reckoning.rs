@@ -55,46 +55,57 @@ pub(crate) struct Jacobians {
 
 /// model.md 6.2, with its symbols: θ heading, sl and sr wheel distances, Δ track.
 pub(crate) fn jacobians(theta: f64, sl: f64, sr: f64, track: f64) -> Jacobians {
-    let s = f64::midpoint(sl, sr);
-    let d = (sr - sl) / track;
-    let c = s * sinc(d / 2.0);
-    let (sin, cos) = (theta + d / 2.0).sin_cos();
-    let h = sinc(d / 2.0) / 2.0;
-    let e = s * sinc_slope(d / 2.0) / (2.0 * track);
-    let dm = 1.0 / (2.0 * track);
-    let x = |dc: f64, dm: f64| cos * dc - c * sin * dm;
-    let y = |dc: f64, dm: f64| sin * dc + c * cos * dm;
+    let Bend { moved: [dx, dy], by_length: [lx, ly], by_turn: [tx, ty] } =
+        bend(theta, f64::midpoint(sl, sr), (sr - sl) / track);
     #[rustfmt::skip]
     let f = Matrix3::new(
-        1.0, 0.0, -c * sin,
-        0.0, 1.0, c * cos,
+        1.0, 0.0, -dy,
+        0.0, 1.0, dx,
         0.0, 0.0, 1.0,
     );
     #[rustfmt::skip]
     let g = Matrix3x2::new(
-        x(h - e, -dm), x(h + e, dm),
-        y(h - e, -dm), y(h + e, dm),
+        lx / 2.0 - tx / track, lx / 2.0 + tx / track,
+        ly / 2.0 - ty / track, ly / 2.0 + ty / track,
         -1.0 / track, 1.0 / track,
     );
     Jacobians { f, g }
 }
 
-/// ∂(x, y, θ)' / ∂d, where `d` is the turn of an arc of the length `s`: what an error of the track does.
-pub(crate) fn turn_slope(theta: f64, s: f64, d: f64) -> [f64; 3] {
+/// An arc, and how its end depends on its length and on its turn.
+pub(crate) struct Bend {
+    /// The displacement along x and y.
+    pub(crate) moved: [f64; 2],
+    /// ∂(x, y) / ∂s.
+    pub(crate) by_length: [f64; 2],
+    /// ∂(x, y) / ∂d: what an error of the turn does.
+    pub(crate) by_turn: [f64; 2],
+}
+
+/// An arc of the length `s` that turns by `d`, begun at the heading `theta`: the chord form of model.md 1.3.
+pub(crate) fn bend(theta: f64, s: f64, d: f64) -> Bend {
+    let (sinc, slope) = sinc(d / 2.0);
     let (sin, cos) = (theta + d / 2.0).sin_cos();
-    let c = s * sinc(d / 2.0);
-    let dc = s * sinc_slope(d / 2.0) / 2.0;
-    [cos * dc - c * sin / 2.0, sin * dc + c * cos / 2.0, 1.0]
+    let (chord, change) = (s * sinc, s * slope / 2.0);
+    Bend {
+        moved: [chord * cos, chord * sin],
+        by_length: [sinc * cos, sinc * sin],
+        by_turn: [cos * change - chord * sin / 2.0, sin * change + chord * cos / 2.0],
+    }
 }
 
-/// sin z / z; accurate for every z but 0, where it is 1 (model.md 1.3).
-fn sinc(z: f64) -> f64 {
-    if z.abs() > 0.0 { z.sin() / z } else { 1.0 }
-}
-
-/// The derivative of [`sinc`]; the difference of the closed form loses its digits near 0 (model.md 6.2).
-fn sinc_slope(z: f64) -> f64 {
-    if z.abs() < 1e-2 { -z / 3.0 + z * z * z / 30.0 } else { (z.cos() - sinc(z)) / z }
+/// sin z / z and its derivative. The closed form of the derivative loses its digits near 0 (model.md 6.2), where both
+/// series are exact to the last digit and need no sine.
+fn sinc(z: f64) -> (f64, f64) {
+    let q = z * z;
+    if q < 0.04 {
+        let sinc = 1.0 - q / 6.0 * (1.0 - q / 20.0 * (1.0 - q / 42.0 * (1.0 - q / 72.0 * (1.0 - q / 110.0))));
+        let slope = -z / 3.0 * (1.0 - q / 10.0 * (1.0 - q / 28.0 * (1.0 - q / 54.0 * (1.0 - q / 88.0))));
+        (sinc, slope)
+    } else {
+        let sinc = z.sin() / z;
+        (sinc, (z.cos() - sinc) / z)
+    }
 }
 
 /// Three rows of three as the wire wants them.

@@ -25,6 +25,8 @@ const RUNS: u32 = 200;
 fn params() -> NavigatorParams {
     NavigatorParams {
         method: Method::Ekf,
+        // The encoders of this robot have no ticks.
+        tick: Metres(0.0),
         ekf: EkfParams {
             start_sd: Metres(0.05),
             start_heading_sd: Radians(0.1),
@@ -118,6 +120,27 @@ fn without_a_gyro_it_is_honest_too() {
     within("NEES", sums.nees, f64::from(3 * RUNS));
     within("NEES of odom", sums.odom, f64::from(3 * RUNS));
     within("NIS", sums.nis, sums.degrees);
+}
+
+#[test]
+fn with_an_accelerometer_it_is_honest_within_fifteen_per_cent() {
+    // The noise is that of speeds which are measured: it does not grow with the way, and is as much at 0.4 m/s.
+    let ekf = EkfParams {
+        accelerometer_noise: 0.01,
+        accelerometer_bias_sd: 0.1,
+        wheel_noise: 0.006,
+        ..params().ekf
+    };
+    let with = NavigatorParams { ekf, k: Metres(0.0), ..params() };
+    let sums = runs(&with, 0, false, true);
+    within("NIS", sums.nis, sums.degrees);
+    // Neighbouring sums of the accelerometer have half a reading in common, which the filter does not know: it is honest,
+    // but no closer than this.
+    let degrees = f64::from(3 * RUNS);
+    for (what, sum) in [("NEES", sums.nees), ("NEES of odom", sums.odom)] {
+        println!("{what}: {:.3} a degree", sum / degrees);
+        assert!((0.85..1.15).contains(&(sum / degrees)), "{what}: {sum:.1} of {degrees}");
+    }
 }
 
 #[test]

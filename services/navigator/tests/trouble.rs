@@ -19,6 +19,8 @@ mod robot;
 use axle_navigator::{
     Counts, EkfParams, Event, Measurement, Method, Navigator, NavigatorParams, Sensor, Side,
 };
+use axle_schema::Boot;
+use axle_schema::window::Window;
 use axle_schema::{EncodersData, InertialData, Metres, Numbers, Pose, Radians, RadiansPerSecond, Seconds};
 use robot::{Robot, fix};
 
@@ -254,4 +256,167 @@ fn without_a_gyro_the_heading_is_unknown_until_the_robot_drives() {
         let later = navigator.position().expect("one").map_covariance.0[8].sqrt();
         assert!(later > 2.0 * sd, "seed {seed}: {sd}, then {later} rad");
     }
+}
+
+/// From where it believes to be to where it is.
+fn miss(robot: &Robot, navigator: &Navigator) -> [f64; 2] {
+    let map = navigator.position().expect("one").map;
+    [robot.truth.x.0 - map.x.0, robot.truth.y.0 - map.y.0]
+}
+
+#[test]
+fn wheels_that_slip_alike_are_told_by_the_accelerometer_only() {
+    let with = EkfParams { accelerometer_noise: 0.01, wheel_noise: 0.002, ..params().ekf };
+    let params = || NavigatorParams { k: Metres(0.0), ..params() };
+    for seed in 1..20 {
+        let mut far = [0.0; 2];
+        for (far, ekf) in far.iter_mut().zip([with, params().ekf]) {
+            let told = ekf.accelerometer_noise > 0.0;
+            // Both robots have one; one filter does not use it.
+            let mut robot = Robot::new(seed, &NavigatorParams { ekf: with, ..params() });
+            let mut navigator = Navigator::new(NavigatorParams { ekf, ..params() }).expect("valid");
+            let _ = navigator.take(robot.encoders());
+            drive(&mut robot, &mut navigator, 500, false, Some);
+            assert_eq!(navigator.events(), [], "seed {seed}");
+            let before = miss(&robot, &navigator);
+            // Straight on, so that the gyro feels nothing of it.
+            robot.slip = [0.5; 2];
+            for _ in 0..40 {
+                for measurement in robot.drive(0.4, 0.4).into_iter().rev() {
+                    let _ = navigator.measure(&measurement);
+                }
+            }
+            robot.slip = [0.0; 2];
+            let events = navigator.events();
+            let skids = events.iter().filter(|event| matches!(event, Event::Skid { .. })).count();
+            assert_eq!((skids, events.len()), (usize::from(told), skids), "seed {seed}: {events:?}");
+            drive(&mut robot, &mut navigator, 50, false, Some);
+            let after = miss(&robot, &navigator);
+            *far = (after[0] - before[0]).hypot(after[1] - before[1]);
+        }
+        // Half of 0.32 m was not driven.
+        assert!(far[1] > 0.12 && far[0] < 0.5 * far[1], "seed {seed}: {far:?} m");
+    }
+}
+
+#[test]
+fn lost_gyro_readings_are_no_slip() {
+    for seed in 1..20 {
+        let (mut robot, mut navigator) = begin(seed, &params());
+        drive(&mut robot, &mut navigator, 500, false, Some);
+        // Turns begin and end within the holes, as a robot's do when its computer is too busy: what the gyro says after a
+        // hole is not what the robot did in it.
+        for step in 0..2000_u32 {
+            let turns = step % 20 < 8;
+            let (left, right) = if turns { (0.1, 0.4) } else { (0.25, 0.25) };
+            let is_lost = (3..11).contains(&(step % 20)) && step % 100 > 40;
+            for measurement in robot.drive(left, right).into_iter().rev() {
+                if !(is_lost && matches!(measurement, Measurement::Inertial(_))) {
+                    let _ = navigator.measure(&measurement);
+                }
+            }
+        }
+        assert_eq!(navigator.events(), [], "seed {seed}");
+    }
+}
+
+#[test]
+fn coarse_ticks_are_no_slip() {
+    // 1.3 cm from tick to tick and 0.4 m/s: every other reading has no tick, and the gyro turns smoothly.
+    for seed in 1..20 {
+        let coarse = NavigatorParams { tick: Metres(0.013), ..params() };
+        let (mut robot, mut navigator) = begin(seed, &coarse);
+        drive(&mut robot, &mut navigator, 3000, true, |measurement| match measurement {
+            Measurement::Encoders(data) => {
+                let cut = |way: Metres| Metres((way.0 / 0.013).floor() * 0.013);
+                Some(Measurement::Encoders(EncodersData {
+                    left: cut(data.left),
+                    right: cut(data.right),
+                    ..data
+                }))
+            }
+            other => Some(other),
+        });
+        assert_eq!(navigator.events(), [], "seed {seed}");
+    }
+}
+
+#[test]
+fn dead_reckoning_is_watched_as_well_and_stops_where_it_is_told() {
+    for (watch, method) in [(true, Method::Arc), (true, Method::Ticks), (false, Method::Arc)] {
+        let watched = NavigatorParams { method, watch, ..params() };
+        let (mut robot, mut navigator) = begin(23, &watched);
+        drive(&mut robot, &mut navigator, 500, false, Some);
+        robot.slip = [0.0, 0.5];
+        drive(&mut robot, &mut navigator, 50, false, Some);
+        let events = navigator.events();
+        assert_eq!(events.iter().any(|event| matches!(event, Event::Slip { .. })), watch, "{events:?}");
+        assert!(events.iter().all(|event| navigator.stops(event)), "{events:?}");
+    }
+    let lenient = NavigatorParams { stop: vec!["kidnapped".into()], ..params() };
+    let navigator = Navigator::new(lenient).expect("valid");
+    let silent = Event::Silent { stamp: Seconds(1.0), sensor: Sensor::Encoders, since: Seconds(0.0) };
+    assert!(!navigator.stops(&silent));
+    let unknown = NavigatorParams { stop: vec!["kidnaped".into()], ..params() };
+    let refused = Navigator::new(unknown).expect_err("a misspelt event").to_string();
+    assert!(refused.contains("kidnaped") && refused.contains("kidnapped"), "{refused}");
+}
+
+#[test]
+fn a_navigator_goes_on_where_another_one_was() {
+    for method in Method::ALL {
+        let all = NavigatorParams { method, ..params() };
+        let (mut robot, mut first) = begin(29, &all);
+        let mut before = Vec::new();
+        drive(&mut robot, &mut first, 500, true, |measurement| {
+            before.push(measurement);
+            Some(measurement)
+        });
+        let _ = first.hear(&Window { boot: Boot(7), ..Window::default() });
+        let last = first.position().expect("one");
+        // Nobody but Source listens for a while; it has something of the time before as well.
+        let mut since = Window { boot: Boot(7), ..Window::default() };
+        let mut keep = |measurement: Measurement| match measurement {
+            Measurement::Encoders(data) => since.encoders.push(data),
+            Measurement::Inertial(data) => since.inertial.push(data),
+            Measurement::Fix(fix) => since.fixes.push(fix),
+            Measurement::Range(range) => since.ranges.push(range),
+        };
+        before.into_iter().for_each(&mut keep);
+        for _ in 0..100 {
+            let (left, right) = robot.winding();
+            robot.drive(left, right).into_iter().rev().for_each(&mut keep);
+        }
+        let begins = Navigator::resume(all.clone(), &last, &Window::default()).expect("a position");
+        let begins = begins.position().expect("one").map;
+        assert!(begins.distance(last.map).0 < 1e-12, "{}: {begins:?}", method.name());
+        let second = Navigator::resume(all.clone(), &last, &since).expect("a position");
+        let _ = first.hear(&since);
+        let [first, second] = [first, second].map(|navigator| navigator.position().expect("one"));
+        let apart = first.map.distance(second.map).0.max(first.odom.pose.distance(second.odom.pose).0);
+        // The bias of the gyro is to be learned again.
+        assert!(apart < 0.02, "{}: {apart} m apart", method.name());
+        assert!(second.map_covariance.0[0] > 0.5 * first.map_covariance.0[0], "it is no surer than before");
+    }
+    let nowhere = axle_schema::Position { map: Pose::new(f64::NAN, 0.0, 0.0), ..Default::default() };
+    assert!(Navigator::resume(params(), &nowhere, &Window::default()).is_err());
+}
+
+#[test]
+fn windows_of_another_run_of_the_robot_begin_anew() {
+    let mut navigator = Navigator::new(params()).expect("valid");
+    let at = |boot, stamp: f64, way: f64| Window {
+        boot: Boot(boot),
+        encoders: vec![EncodersData { stamp: Seconds(stamp), left: Metres(way), right: Metres(way) }],
+        ..Window::default()
+    };
+    let _ = navigator.hear(&at(1, 1.0, 0.0));
+    let here = navigator.hear(&at(1, 1.1, 0.05)).expect("a pose").pose;
+    assert_eq!(navigator.hear(&at(1, 1.1, 0.05)), None, "a window that repeats says nothing new");
+    // The robot was gone for so short a time that its stamps alone would tell nothing.
+    let again = navigator.hear(&at(2, 1.15, 0.0)).expect("a pose").pose;
+    assert!(again.distance(here).0 < 1e-12, "{again:?}");
+    let next = navigator.hear(&at(2, 1.25, 0.05)).expect("a pose").pose;
+    assert!((next.x.0 - here.x.0 - 0.05).abs() < 1e-12, "{next:?}");
+    assert_eq!((navigator.counts().restarts, navigator.position().expect("one").boot), (1, Boot(2)));
 }

@@ -1,8 +1,8 @@
-//! What the spans tell about the sensors: slip, a stuck encoder, silence, and a gyro of another unit.
+//! What the spans tell about the sensors: slip, a stuck encoder, and a gyro of another unit.
 
 use super::filter::Innovation;
-use crate::event::{Event, Sensor, Side};
-use axle_schema::{Metres, Radians, Seconds};
+use axle_schema::event::{Event, Side};
+use axle_schema::{Metres, MetresPerSecond, Radians, Seconds};
 use std::collections::VecDeque;
 
 /// A gyro has proved its unit when the wheels turned so far, in rad.
@@ -18,12 +18,18 @@ const STUCK: f64 = 0.05;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
     pub(super) stamp: f64,
+    pub(super) dt: f64,
     pub(super) left: f64,
     pub(super) right: f64,
     pub(super) track: f64,
     /// The gyro's angle without its bias.
     pub(super) gyro: Option<f64>,
-    pub(super) innovation: Option<Innovation>,
+    /// What the gyro thinks of the wheels.
+    pub(super) turn: Option<Innovation>,
+    /// What the accelerometer thinks of them.
+    pub(super) way: Option<Innovation>,
+    /// By what the speed changed, by the accelerometer and in m/s.
+    pub(super) change: Option<f64>,
 }
 
 /// Watches the sensors.
@@ -35,12 +41,14 @@ pub(super) struct Watch {
     scale: Option<f64>,
     /// Stamps and innovations of the last spans.
     last: VecDeque<(f64, Innovation)>,
+    /// Their sums: of the innovations, and of their variances.
+    sums: [f64; 2],
     slipping: bool,
+    /// Until when both wheels count as slipping alike.
+    skids: f64,
     /// Since one encoder stays: which, what the other covered, and both turns.
     stuck: Option<(Side, f64, f64, f64)>,
     stuck_said: bool,
-    /// The last stamp of encoders and gyro, and whether their silence was said.
-    heard: [Option<(f64, bool)>; 2],
 }
 
 impl Watch {
@@ -55,33 +63,25 @@ impl Watch {
         }
     }
 
-    /// A sensor spoke, or at least its time has come: says who has been silent for longer than `silence`.
-    pub(super) fn hear(&mut self, sensor: Sensor, stamp: f64, silence: f64) -> Option<Event> {
-        let index = |sensor| usize::from(sensor == Sensor::Gyro);
-        self.heard[index(sensor)] = Some((stamp, false));
-        let other = if sensor == Sensor::Gyro { Sensor::Encoders } else { Sensor::Gyro };
-        let (since, said) = self.heard[index(other)].as_mut()?;
-        if *said || stamp - *since <= silence {
-            return None;
-        }
-        *said = true;
-        Some(Event::Silent { stamp: Seconds(stamp), sensor: other, since: Seconds(*since) })
-    }
-
     /// A clock that begins anew.
     pub(super) fn restart(&mut self) {
-        self.heard = [None; 2];
         self.last.clear();
-        (self.slipping, self.stuck) = (false, None);
+        (self.sums, self.slipping, self.skids, self.stuck) = ([0.0; 2], false, 0.0, None);
     }
 
     /// Looks at a span for the first time.
-    pub(super) fn look(&mut self, seen: &Seen, raw: Option<f64>, gate: f64) -> Vec<Event> {
+    pub(super) fn look(
+        &mut self,
+        seen: &Seen,
+        raw: Option<f64>,
+        gate: f64,
+    ) -> impl Iterator<Item = Event> + use<> {
         let encoders = (seen.right - seen.left) / seen.track;
         let scale = raw.and_then(|raw| self.unit(seen.stamp, encoders, raw));
         let slip = self.slip(seen, encoders, gate);
+        let skid = self.skid(seen, gate);
         let stuck = self.stays(seen, encoders);
-        [scale, slip, stuck].into_iter().flatten().collect()
+        [scale, slip, skid, stuck].into_iter().flatten()
     }
 
     fn unit(&mut self, stamp: f64, encoders: f64, raw: f64) -> Option<Event> {
@@ -102,13 +102,14 @@ impl Watch {
     }
 
     fn slip(&mut self, seen: &Seen, encoders: f64, gate: f64) -> Option<Event> {
-        let (Some(innovation), Some(gyro)) = (seen.innovation, seen.gyro) else { return None };
+        let (Some(innovation), Some(gyro)) = (seen.turn, seen.gyro) else { return None };
         while self.last.len() >= MOST || self.last.front().is_some_and(|first| first.0 < seen.stamp - WHILE) {
             let _ = self.last.pop_front();
         }
         self.last.push_back((seen.stamp, innovation));
-        let nu: f64 = self.last.iter().map(|(_, innovation)| innovation.nu).sum();
-        let s: f64 = self.last.iter().map(|(_, innovation)| innovation.s).sum();
+        let add = |[nu, s]: [f64; 2], (_, last): &(f64, Innovation)| [nu + last.nu, s + last.s];
+        self.sums = self.last.iter().fold([0.0; 2], add);
+        let [nu, s] = self.sums;
         let squared = nu * nu / s;
         let slips = self.gyro_is_proved() && squared > gate;
         let begins = slips && !self.slipping;
@@ -127,10 +128,26 @@ impl Watch {
         if !self.slipping {
             return 0.0;
         }
-        let nu: f64 = self.last.iter().map(|(_, innovation)| innovation.nu).sum();
         #[allow(clippy::cast_precision_loss, reason = "at most 64")]
         let n = self.last.len() as f64;
-        (nu * track).powi(2) / (2.0 * n)
+        (self.sums[0] * track).powi(2) / (2.0 * n)
+    }
+
+    /// Both wheels may slip alike, and then turn nothing that a gyro would feel.
+    fn skid(&mut self, seen: &Seen, gate: f64) -> Option<Event> {
+        let (way, change) = (seen.way?, seen.change?);
+        if way.squared() <= gate {
+            return None;
+        }
+        let begins = seen.stamp > self.skids;
+        self.skids = seen.stamp + WHILE;
+        begins.then_some(Event::Skid {
+            stamp: Seconds(seen.stamp),
+            encoders: MetresPerSecond(f64::midpoint(seen.left, seen.right) / seen.dt),
+            accelerometer: MetresPerSecond(f64::midpoint(seen.left, seen.right) / seen.dt + way.nu),
+            change: MetresPerSecond(change),
+            squared: way.squared(),
+        })
     }
 
     #[allow(clippy::float_cmp, reason = "a stuck encoder repeats the very same reading")]

@@ -5,7 +5,8 @@
 use axle_navigator::{Measurement, NavigatorParams};
 use axle_schema::motion::arc;
 use axle_schema::{
-    EncodersData, Fix, InertialData, Metres, Numbers, Pose, Radians, RadiansPerSecond, Seconds,
+    EncodersData, Fix, InertialData, Metres, MetresPerSecondSquared, Numbers, Pose, Radians,
+    RadiansPerSecond, Seconds,
 };
 
 /// Normal and uniform numbers by a seed (SplitMix64 and Box and Muller's polar form).
@@ -38,9 +39,13 @@ pub(crate) struct Robot {
     counted: [f64; 2],
     pub(crate) bias: f64,
     k: f64,
+    wheel_noise: f64,
     gyro_noise: f64,
     /// How much farther than the robot each wheel turns, as a share: a slip.
     pub(crate) slip: [f64; 2],
+    /// What the accelerometer reads too much, in m/s², if there is one; its noise; and the speed of the last span.
+    push: Option<(f64, f64)>,
+    speed: f64,
 }
 
 impl Robot {
@@ -56,15 +61,19 @@ impl Robot {
         );
         let bias = near(0.0, ekf.bias_sd);
         Self {
-            random,
             truth,
             past: vec![truth],
             step: 0,
             counted: [0.0; 2],
             bias,
             k: params.k.0,
+            wheel_noise: ekf.wheel_noise,
             gyro_noise: ekf.gyro_noise,
             slip: [0.0; 2],
+            push: (ekf.accelerometer_noise > 0.0)
+                .then(|| (ekf.accelerometer_bias_sd * random.normal(), ekf.accelerometer_noise)),
+            speed: 0.0,
+            random,
         }
     }
 
@@ -85,7 +94,14 @@ impl Robot {
         let mut real = [left * DT, right * DT];
         for (side, way) in real.iter_mut().enumerate() {
             self.counted[side] += *way;
-            *way += (self.k * way.abs()).sqrt() * self.random.normal();
+            // Noise of the way or of its measurement is the same to a filter, but an accelerometer would feel the first.
+            let variance = self.k * way.abs() + self.wheel_noise.powi(2) * DT;
+            let noise = variance.sqrt() * self.random.normal();
+            if self.push.is_some() {
+                self.counted[side] -= noise;
+            } else {
+                *way += noise;
+            }
             *way *= 1.0 - self.slip[side];
         }
         let (x, y, theta) = arc(real[0], real[1], TRACK);
@@ -94,8 +110,16 @@ impl Robot {
         self.step += 1;
         let noise = self.gyro_noise / DT.sqrt() * self.random.normal();
         let rate = theta / DT + self.bias + noise;
+        // An accelerometer reads by what the speed has changed since the reading before, the mean of a span each.
+        let speed = f64::midpoint(real[0], real[1]) / DT;
+        let ax = self.push.map(|(bias, noise)| {
+            let change = if self.step == 1 { 0.0 } else { speed - self.speed };
+            let felt = change / DT + bias + noise / DT.sqrt() * self.random.normal();
+            MetresPerSecondSquared(felt)
+        });
+        self.speed = speed;
         let stamp = Seconds(self.now());
-        let gyro = InertialData { stamp, gyro: RadiansPerSecond(rate), ax: None, ay: None };
+        let gyro = InertialData { stamp, gyro: RadiansPerSecond(rate), ax, ay: None };
         [Measurement::Encoders(self.encoders()), Measurement::Inertial(gyro)]
     }
 
