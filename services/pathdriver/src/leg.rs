@@ -3,10 +3,11 @@
 //! A geometry is driven with a constant ratio of the wheel speeds, so that the only freedom is how fast the leading
 //! (faster) wheel runs. What strategies choose is its speed at the two ends of the leg.
 
-use axle_schema::{Drivetrain, Dwm, Leg, MetresPerSecond, Refusal, Seconds, Sides};
+use crate::limits::Limits;
+use axle_schema::{Dwm, Leg, MetresPerSecond, Refusal, Seconds, Sides};
 
 /// Phases shorter than this, in s, come from rounding and are left out (model.md 4.4).
-const LEAST_PHASE: f64 = 1e-12;
+pub(crate) const LEAST_PHASE: f64 = 1e-12;
 
 /// A leg seen from its leading wheel; symbols as in model.md 4.4.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,24 +20,43 @@ pub(crate) struct Course {
     pub(crate) u_max: f64,
     /// The acceleration of the leading wheel, m/s².
     pub(crate) a: f64,
+    /// Speed of the middle of the axle for a leading wheel at 1, signed.
+    pub(crate) kv: f64,
+    /// Turn rate for a leading wheel at 1, signed, 1/m.
+    pub(crate) k_omega: f64,
 }
 
 impl Course {
-    /// The leg within the limits of `robot`; none for a leg that moves no wheel.
-    pub(crate) fn of(leg: &Leg, robot: &Drivetrain) -> Option<Self> {
+    /// The leg within `limits`; none for a leg that moves no wheel.
+    pub(crate) fn of(leg: &Leg, limits: &Limits) -> Option<Self> {
+        let robot = &limits.robot;
         let distances = leg.geometry.wheel_distances(robot.track);
         let s = distances.left.0.abs().max(distances.right.0.abs());
         if !(s > 0.0 && s.is_finite()) {
             return None;
         }
         let k = distances.map(|distance| distance.0 / s);
-        // kv and kω of the model: what the middle of the axle does for a leading wheel at 1.
-        let kv = f64::midpoint(k.left, k.right).abs();
-        let k_omega = ((k.right - k.left) / robot.track.get()).abs();
+        let kv = f64::midpoint(k.left, k.right);
+        let k_omega = (k.right - k.left) / robot.track.get();
         let v_lin = leg.speed.map_or(robot.speed.0, |speed| speed.0.min(robot.speed.0));
         // A line has kω = 0 and a turn has kv = 0: the quotient is then infinite and limits nothing.
-        let u_max = robot.wheel_speed.0.min(v_lin / kv).min(robot.turn_rate.0 / k_omega);
-        Some(Self { k, s, u_max, a: robot.wheel_acceleration.0 })
+        let u_max = robot
+            .wheel_speed
+            .0
+            .min(v_lin / kv.abs())
+            .min(robot.turn_rate.0 / k_omega.abs())
+            .min((limits.lateral / (kv * k_omega).abs()).sqrt());
+        let a = robot
+            .wheel_acceleration
+            .0
+            .min(limits.acceleration / kv.abs())
+            .min(limits.turn_acceleration / k_omega.abs());
+        Some(Self { k, s, u_max, a, kv, k_omega })
+    }
+
+    /// The same leg without `begin` and `end` of the distance of its leading wheel, m.
+    pub(crate) fn without(&self, begin: f64, end: f64) -> Self {
+        Self { s: (self.s - begin - end).max(0.0), ..*self }
     }
 
     /// Speeding up from `u0`, cruising, braking to `u1`: the fastest movements along the leg. Needs `u0` and `u1`
@@ -67,20 +87,24 @@ impl Course {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use axle_schema::{Geometry, Metres, MetresPerSecondSquared, Radians, RadiansPerSecond};
+    use axle_schema::{Drivetrain, Geometry, Metres, MetresPerSecondSquared, Radians, RadiansPerSecond};
 
-    fn robot() -> Drivetrain {
-        Drivetrain {
+    fn limits() -> Limits {
+        let robot = Drivetrain {
             wheel_speed: MetresPerSecond(1.0),
             wheel_acceleration: MetresPerSecondSquared(1.5),
             speed: MetresPerSecond(0.8),
             turn_rate: RadiansPerSecond(2.0),
             ..Drivetrain::default()
-        }
+        };
+        Limits::of_wheels(robot)
     }
 
+    fn within(geometry: Geometry, limits: &Limits) -> Course {
+        Course::of(&Leg { geometry, point: 0, speed: None }, limits).expect("a leg that moves")
+    }
     fn course(geometry: Geometry) -> Course {
-        Course::of(&Leg { geometry, point: 0, speed: None }, &robot()).expect("a leg that moves")
+        within(geometry, &limits())
     }
 
     #[test]
@@ -115,9 +139,24 @@ mod tests {
     }
 
     #[test]
+    fn the_body_limits_what_the_wheels_could() {
+        let arc = Geometry::Arc { radius: Metres(0.5), angle: Radians(1.0) };
+        // On this arc the middle of the axle runs at u / 1.3 and turns at u / 0.65.
+        let calm = |limits: Limits| within(arc, &limits);
+        let aside = calm(Limits { lateral: 0.5, ..limits() });
+        assert!((aside.u_max - (0.5_f64 * 1.3 * 0.65).sqrt()).abs() < 1e-12, "{aside:?}");
+        let along = calm(Limits { acceleration: 0.5, ..limits() });
+        assert!((along.a - 0.65).abs() < 1e-12, "{along:?}");
+        let round = calm(Limits { turn_acceleration: 1.0, ..limits() });
+        assert!((round.a - 0.65).abs() < 1e-12, "{round:?}");
+        let turn = within(Geometry::Turn { angle: Radians(1.0) }, &Limits { lateral: 0.01, ..limits() });
+        assert!((turn.u_max - 0.3).abs() < 1e-12, "who turns on the spot is not pressed aside: {turn:?}");
+    }
+
+    #[test]
     fn a_leg_without_length_moves_no_wheel() {
         for geometry in [Geometry::Line { length: Metres(0.0) }, Geometry::Turn { angle: Radians(-0.0) }] {
-            assert_eq!(Course::of(&Leg { geometry, point: 0, speed: None }, &robot()), None);
+            assert_eq!(Course::of(&Leg { geometry, point: 0, speed: None }, &limits()), None);
         }
     }
 }

@@ -4,18 +4,19 @@
 //! is the one strategy that needs no excuse: no jump, and the path is the plan's own.
 
 use crate::leg::Course;
+use crate::limits::Limits;
 use axle_schema::dwm::MAX_DURATION;
-use axle_schema::{Drive, DriveAsk, Drivetrain, Dwm, MetresPerSecond, Refusal, Seconds, Sides};
+use axle_schema::{Drive, DriveAsk, Dwm, MetresPerSecond, Refusal, Seconds, Sides};
 
 /// Speeds at the beginning that differ by less than this, in m/s, from what the first leg needs are taken for it.
-const SAME_SPEED: f64 = 1e-6;
+pub(crate) const SAME_SPEED: f64 = 1e-6;
 
-/// The movements for the legs of `ask` within the limits of `robot`.
-pub(crate) fn drive(robot: &Drivetrain, ask: &DriveAsk) -> Result<Drive, Refusal> {
+/// The movements for the legs of `ask` within `limits`.
+pub(crate) fn drive(limits: &Limits, ask: &DriveAsk) -> Result<Drive, Refusal> {
     let mut drive = Drive { counts: Vec::with_capacity(ask.legs.len()), ..Drive::default() };
     let mut beginning = given(ask.speeds)?;
     for (index, leg) in ask.legs.iter().enumerate() {
-        let movements = match Course::of(leg, robot) {
+        let movements = match Course::of(leg, limits) {
             Some(course) => {
                 let u0 = beginning.take().map_or(Ok(0.0), |speeds| first_speed(&course, speeds))?;
                 course.movements(u0, 0.0)?
@@ -35,7 +36,9 @@ pub(crate) fn drive(robot: &Drivetrain, ask: &DriveAsk) -> Result<Drive, Refusal
 }
 
 /// The speeds at the beginning; none when the robot stands.
-fn given(speeds: Option<Sides<MetresPerSecond>>) -> Result<Option<Sides<MetresPerSecond>>, Refusal> {
+pub(crate) fn given(
+    speeds: Option<Sides<MetresPerSecond>>,
+) -> Result<Option<Sides<MetresPerSecond>>, Refusal> {
     let Some(speeds) = speeds else { return Ok(None) };
     for (side, speed) in [("left", speeds.left), ("right", speeds.right)] {
         let limit = axle_schema::dwm::MAX_WHEEL_SPEED;
@@ -73,14 +76,14 @@ fn first_speed(course: &Course, speeds: Sides<MetresPerSecond>) -> Result<f64, R
     Ok(u0.min(course.u_max))
 }
 
-fn unreachable(speeds: Sides<MetresPerSecond>, why: &str) -> Refusal {
+pub(crate) fn unreachable(speeds: Sides<MetresPerSecond>, why: &str) -> Refusal {
     let Sides { left, right } = speeds;
     let why = format!("the wheels run at {left} and {right} at the beginning, but {why}; stop first");
     Refusal::Unreachable { why }
 }
 
 /// A movement longer than the longest that a [`Dwm`] may describe is refused here, not by its receiver.
-fn check_duration(number: usize, dwm: &Dwm) -> Result<(), Refusal> {
+pub(crate) fn check_duration(number: usize, dwm: &Dwm) -> Result<(), Refusal> {
     if dwm.duration().0 <= MAX_DURATION {
         return Ok(());
     }
@@ -92,28 +95,31 @@ fn check_duration(number: usize, dwm: &Dwm) -> Result<(), Refusal> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use axle_schema::{Geometry, Leg, Metres, Radians};
+    use axle_schema::{Drivetrain, Geometry, Leg, Metres, Radians};
+
+    fn robot() -> Limits {
+        Limits::of_wheels(Drivetrain::default())
+    }
 
     fn line(length: f64) -> Leg {
         Leg { geometry: Geometry::Line { length: Metres(length) }, point: 0, speed: None }
     }
     fn ask(legs: Vec<Leg>, left: f64, right: f64) -> DriveAsk {
         let speeds = Some(Sides::new(MetresPerSecond(left), MetresPerSecond(right)));
-        DriveAsk { legs, speeds, robot: None }
+        DriveAsk { legs, speeds, robot: None, manner: None }
     }
 
     #[test]
     fn nothing_to_drive_is_an_empty_drive() {
-        let empty = drive(&Drivetrain::default(), &DriveAsk::default()).expect("no legs are no fault");
+        let empty = drive(&robot(), &DriveAsk::default()).expect("no legs are no fault");
         assert_eq!(empty, Drive::default());
-        let none =
-            drive(&Drivetrain::default(), &ask(vec![line(0.0)], 0.0, 0.0)).expect("no length is no fault");
+        let none = drive(&robot(), &ask(vec![line(0.0)], 0.0, 0.0)).expect("no length is no fault");
         assert_eq!((none.dwms.len(), none.counts.as_slice()), (0, [0].as_slice()));
     }
 
     #[test]
     fn a_moving_robot_goes_on_along_the_first_leg() {
-        let drive = drive(&Drivetrain::default(), &ask(vec![line(1.0)], 0.3, 0.3)).expect("the same ratio");
+        let drive = drive(&robot(), &ask(vec![line(1.0)], 0.3, 0.3)).expect("the same ratio");
         assert!((drive.dwms[0].start().left.0 - 0.3).abs() < 1e-12);
         let distance: f64 = drive.dwms.iter().map(|dwm| dwm.encoders_span().left.0).sum();
         assert!((distance - 1.0).abs() < 1e-12, "drives {distance} m");
@@ -123,8 +129,7 @@ mod tests {
     #[test]
     fn a_robot_that_moves_otherwise_than_the_first_leg_is_refused_with_the_reason() {
         let check = |legs: Vec<Leg>, left, right, words: &str| {
-            let refusal =
-                drive(&Drivetrain::default(), &ask(legs, left, right)).expect_err(words).to_string();
+            let refusal = drive(&robot(), &ask(legs, left, right)).expect_err(words).to_string();
             assert!(refusal.contains(words), "{refusal:?} does not say {words:?}");
         };
         check(vec![line(1.0)], 0.3, 0.2, "in the ratio 1.000000 to 1.000000");
@@ -139,17 +144,14 @@ mod tests {
     #[test]
     fn the_speed_of_a_leg_limits_the_middle_of_the_axle() {
         let slow = Leg { speed: Some(MetresPerSecond(0.1)), ..line(1.0) };
-        let drive = drive(&Drivetrain::default(), &DriveAsk { legs: vec![slow], ..DriveAsk::default() });
+        let drive = drive(&robot(), &DriveAsk { legs: vec![slow], ..DriveAsk::default() });
         let peak = drive.expect("a slow line").dwms.iter().map(|dwm| dwm.peak_speed().0).fold(0.0, f64::max);
         assert!((peak - 0.1).abs() < 1e-12, "peaks at {peak} m/s");
     }
 
     #[test]
     fn a_leg_of_hours_is_refused_with_its_number() {
-        let refusal = drive(
-            &Drivetrain::default(),
-            &DriveAsk { legs: vec![line(1.0), line(1e5)], ..DriveAsk::default() },
-        );
+        let refusal = drive(&robot(), &DriveAsk { legs: vec![line(1.0), line(1e5)], ..DriveAsk::default() });
         let words = refusal.expect_err("100 km").to_string();
         assert!(words.contains("duration of leg 2") && words.contains("way points"), "{words}");
     }

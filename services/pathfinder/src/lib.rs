@@ -1,53 +1,132 @@
 //! Pathfinder: way points to geometries.
 //!
-//! Hears [`PlanAsk`] (the points, and where the robot is), says [`Plan`] (turns and lines, one after the other). It is
+//! Hears [`PlanAsk`] (the points, where the robot is, how the way shall be made, perhaps a map), says [`Plan`] (turns,
+//! lines and arcs, one after the other, with their length, an estimate of the time, and the clearance on the map). It is
 //! the functional service between the user's task and Pathdriver (paper, section II). It plans in the frame of the
-//! points and knows nothing of speeds, wheels or obstacles.
+//! points and knows nothing of wheel speeds.
 //!
-//! What cannot be planned is refused with the number of the point and the name of the field; nothing is dropped in
-//! silence. Each strategy is one file; a new one is that file, a variant of [`Strategy`] and a line in `answer`.
+//! What cannot be planned is refused with the number of the point and the reason; nothing is dropped in silence. Each
+//! strategy is one file; a new one is that file, a variant of [`PlanStrategy`] and a line in [`plan`].
 
+use axle_maps::Unknown;
 use axle_schema::contract::{Bounds, Functional, Params};
 use axle_schema::refusal::within;
 use axle_schema::way::MAX_COORDINATE;
-use axle_schema::{Message as _, Metres, Plan, PlanAsk, Pose, Refusal};
+use axle_schema::{
+    Drivetrain, Message as _, Metres, Plan, PlanAsk, PlanStrategy, Pose, Refusal, Seconds, WayPoint,
+};
 use serde::{Deserialize, Serialize};
 
+mod arcs;
+mod cells;
+mod corner;
+mod dubins;
+mod estimate;
+mod map;
+mod order;
+mod rounded;
+mod search;
+mod smooth;
+mod terrain;
 mod turn_and_go;
+mod way;
 
-/// How the way is made of geometries.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Strategy {
-    /// Turn on the spot towards the next point, then go straight to it: the simplest way of the paper.
-    #[default]
-    TurnAndGo,
-}
+pub use order::EXACT;
+pub use search::Watch;
+pub use terrain::Terrain;
+use way::Way;
+
+/// The most points that may be reordered on a map: each pair of them is a search.
+pub const MOST_ON_MAP: usize = 64;
 
 /// Parameters of Pathfinder: `deploy/params/pathfinder.toml`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PathfinderParams {
-    /// How the way is made of geometries.
-    pub strategy: Strategy,
+    /// How the way is made of geometries, where the question does not say.
+    pub strategy: PlanStrategy,
     /// A point closer than this to where the robot already is counts as visited without moving; 0 to 1 m.
     pub merge: Metres,
+    /// Largest radius of a rounded corner, and the radius of every curve of `dubins`; 0.01 to 100 m.
+    pub radius: Metres,
+    /// How far a rounded corner may stay away from its way point; 0 to 100 m.
+    pub corridor: Metres,
+    /// How far an arc to a point may swing out from the straight line; 0 to 100 m.
+    pub hump: Metres,
+    /// The share of a corner of `smooth` that is clothoid; 0.05 to 1.
+    pub blend: f64,
+    /// The largest step of curvature along a corner of `smooth`; 0.05 to 100 /m.
+    pub curvature_step: f64,
+    /// Radius of the circle around the middle of the axle that holds the whole robot, where the question does not say;
+    /// 0 to 10 m. The pilot says its own `radius` with every question.
+    pub body: Metres,
+    /// Room that a way on a map leaves beside the robot where it can; 0 to 10 m.
+    pub margin: Metres,
+    /// Closer to an obstacle than this a way on a map costs more; 0 to 10 m beside the robot.
+    pub comfort: Metres,
+    /// How much more, in lengths of way, right at an obstacle; 0 to 100. 0 finds the shortest way.
+    pub clearance_weight: f64,
+    /// Whether the robot may drive where nobody knows what is there.
+    pub unknown_is_free: bool,
+    /// How long an answer may take, where the question does not say; 0.001 to 60 s.
+    pub deadline: Seconds,
+    /// The robot that drives, where the question does not describe it.
+    pub robot: Drivetrain,
 }
 
 impl Default for PathfinderParams {
     fn default() -> Self {
-        Self { strategy: Strategy::default(), merge: Metres(1e-3) }
+        Self {
+            strategy: PlanStrategy::default(),
+            merge: Metres(1e-3),
+            radius: Metres(0.5),
+            corridor: Metres(0.2),
+            hump: Metres(0.2),
+            blend: 0.6,
+            curvature_step: 0.5,
+            body: Drivetrain::BODY,
+            margin: Metres(0.05),
+            comfort: Metres(0.3),
+            clearance_weight: 1.0,
+            unknown_is_free: false,
+            deadline: Seconds(2.5),
+            robot: Drivetrain::default(),
+        }
     }
 }
 
 impl Bounds for PathfinderParams {
     fn check(&self) -> Result<(), Refusal> {
-        within("merge in m", self.merge.0, 0.0, 1.0)
+        within("merge in m", self.merge.0, 0.0, 1.0)?;
+        within("radius in m", self.radius.0, 0.01, 100.0)?;
+        within("corridor in m", self.corridor.0, 0.0, 100.0)?;
+        within("hump in m", self.hump.0, 0.0, 100.0)?;
+        within("blend", self.blend, 0.05, 1.0)?;
+        within("curvature_step in 1/m", self.curvature_step, 0.05, 100.0)?;
+        within("body in m", self.body.0, 0.0, 10.0)?;
+        within("margin in m", self.margin.0, 0.0, 10.0)?;
+        within("comfort in m", self.comfort.0, 0.0, 10.0)?;
+        within("clearance_weight", self.clearance_weight, 0.0, 100.0)?;
+        within("deadline in s", self.deadline.0, 1e-3, 60.0)?;
+        self.robot.check()
     }
 }
 
 impl Params for PathfinderParams {
     const FILE: &'static str = include_str!("../../../deploy/params/pathfinder.toml");
+}
+
+impl PathfinderParams {
+    /// What cells are that nobody knows anything of.
+    #[must_use]
+    pub const fn unknown(&self) -> Unknown {
+        if self.unknown_is_free { Unknown::Free } else { Unknown::Blocked }
+    }
+    /// How a question shall be answered.
+    #[must_use]
+    pub fn strategy(&self, ask: &PlanAsk) -> PlanStrategy {
+        ask.strategy.unwrap_or(self.strategy)
+    }
 }
 
 /// The service that finds a path.
@@ -62,12 +141,91 @@ impl Functional for Pathfinder {
     fn answer(params: &PathfinderParams, ask: &PlanAsk) -> Result<Plan, Refusal> {
         params.check()?;
         ask.check()?;
-        let start = ask.start.unwrap_or_default();
-        check_start(start)?;
-        Ok(match params.strategy {
-            Strategy::TurnAndGo => turn_and_go::plan(params.merge, start, &ask.way.points),
-        })
+        let terrain = ask.map.as_ref().map(|map| Terrain::of(map, params.unknown())).transpose()?;
+        plan(params, ask, terrain.as_ref(), &mut |_| Ok(()))
     }
+}
+
+/// What the strategies are given.
+pub(crate) struct Task<'a> {
+    params: &'a PathfinderParams,
+    robot: Drivetrain,
+    body: Metres,
+}
+
+/// Answers one question, on a map that was made ready before; `watch` hears how far a long search is, and may end it.
+///
+/// # Errors
+/// A [`Refusal`] that says what is wrong with the question, why there is no way, or what `watch` ended it with.
+pub fn plan(
+    params: &PathfinderParams,
+    ask: &PlanAsk,
+    terrain: Option<&Terrain>,
+    watch: Watch<'_>,
+) -> Result<Plan, Refusal> {
+    params.check()?;
+    ask.check()?;
+    let start = ask.start.unwrap_or_default();
+    check_start(start)?;
+    let (robot, body) = (ask.robot.unwrap_or(params.robot), ask.body.unwrap_or(params.body));
+    let task = Task { params, robot, body };
+    let strategy = params.strategy(ask);
+    let mut points: Vec<(usize, WayPoint)> = ask.way.points.iter().copied().enumerate().collect();
+    let map = || {
+        terrain.ok_or_else(|| {
+            let hint = "the strategy map needs one: give it with the question, or start `axle run map`";
+            Refusal::missing("map", hint)
+        })
+    };
+    let mut order = Vec::new();
+    if ask.reorder {
+        let on = if strategy == PlanStrategy::Map { Some(map()?) } else { None };
+        points = reordered(&task, on, start, &points, watch)?;
+        #[allow(clippy::cast_possible_truncation, reason = "at most MAX_POINTS points")]
+        order.extend(points.iter().map(|(index, _)| *index as u32));
+    }
+    let mut way = Way::new(start);
+    match strategy {
+        PlanStrategy::TurnAndGo => turn_and_go::plan(&mut way, params.merge, &points),
+        PlanStrategy::Rounded => rounded::plan(&mut way, &task, &points),
+        PlanStrategy::Arcs => arcs::plan(&mut way, &task, &points),
+        PlanStrategy::Smooth => smooth::plan(&mut way, &task, &points),
+        PlanStrategy::Dubins => dubins::plan(&mut way, &task, &points),
+        PlanStrategy::Map => map::plan(&mut way, &task, map()?, &points, watch)?,
+    }
+    let clearance =
+        terrain.map(|terrain| map::clearance(terrain, start, way.legs(), body, watch)).transpose()?;
+    let time = Some(estimate::time(way.legs(), &robot));
+    Ok(Plan { strategy: Some(strategy), time, clearance, order, ..way.into_plan() })
+}
+
+/// The points in a short order: by their distances on the map, or straight.
+fn reordered(
+    task: &Task<'_>,
+    terrain: Option<&Terrain>,
+    start: Pose,
+    points: &[(usize, WayPoint)],
+    watch: Watch<'_>,
+) -> Result<Vec<(usize, WayPoint)>, Refusal> {
+    let order = if let Some(terrain) = terrain {
+        if points.len() > MOST_ON_MAP {
+            let what = "way points to reorder on a map".into();
+            return Err(Refusal::TooLarge { what, got: points.len() as u64, limit: MOST_ON_MAP as u64 });
+        }
+        let table = map::distances(task, terrain, start, points, watch)?;
+        let between = |a: usize, b: usize| table.get(a).and_then(|row| row.get(b)).copied().unwrap_or(0.0);
+        order::order(points.len(), between, watch)?
+    } else {
+        let places: Vec<Pose> = std::iter::once(start)
+            .chain(points.iter().map(|(_, point)| Pose { x: point.x, y: point.y, ..start }))
+            .collect();
+        let between = |a: usize, b: usize| match (places.get(a), places.get(b)) {
+            (Some(a), Some(b)) => a.distance(*b).0,
+            _ => 0.0,
+        };
+        order::order(points.len(), between, watch)?
+    };
+    Ok(order.into_iter().filter_map(|index| points.get(index).copied()).collect())
 }
 
 /// The start obeys the limits of a way point, so that every line of the plan is one that [`Plan`] may carry.
@@ -78,42 +236,4 @@ fn check_start(start: Pose) -> Result<(), Refusal> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use axle_schema::{WayPoint, WayTask};
-
-    fn refused(ask: &PlanAsk, words: &str) {
-        let refusal = Pathfinder::answer(&PathfinderParams::default(), ask).expect_err(words).to_string();
-        assert!(refusal.contains(words), "{refusal:?} does not say {words:?}");
-    }
-
-    #[test]
-    fn the_parameter_file_holds_the_defaults() {
-        let read: PathfinderParams = toml::from_str(PathfinderParams::FILE).expect("the file is valid");
-        assert_eq!(read, PathfinderParams::default());
-        let written = toml::Table::try_from(PathfinderParams::default()).expect("parameters are a table");
-        let table: toml::Table = toml::from_str(PathfinderParams::FILE).expect("the file is a table");
-        assert_eq!(table, written, "the file lists every field");
-        assert!(toml::from_str::<PathfinderParams>("merg = 0.1").is_err(), "a misspelt field is refused");
-    }
-
-    #[test]
-    fn a_parameter_out_of_its_range_is_refused_by_name() {
-        for merge in [-1.0, 2.0, f64::NAN] {
-            let params = PathfinderParams { merge: Metres(merge), ..PathfinderParams::default() };
-            assert!(params.check().expect_err("merge is wrong").to_string().contains("merge in m"));
-        }
-    }
-
-    #[test]
-    fn a_bad_question_is_refused_by_the_name_of_its_fault() {
-        let ask = |points: Vec<WayPoint>| PlanAsk { way: WayTask { points }, start: None };
-        refused(&ask(vec![]), "at least one point");
-        refused(&ask(vec![WayPoint::at(f64::NAN, 0.0)]), "x of way point 1 is out of range: NaN");
-        refused(&ask(vec![WayPoint::at(0.0, 0.0); 4097]), "way points is too large: 4097");
-        let from = |start| PlanAsk { start: Some(start), ..ask(vec![WayPoint::at(1.0, 0.0)]) };
-        refused(&from(Pose::new(f64::INFINITY, 0.0, 0.0)), "x of the start in m is out of range: inf");
-        refused(&from(Pose::new(0.0, -1e6, 0.0)), "y of the start in m is out of range: -1000000");
-        refused(&from(Pose::new(0.0, 0.0, f64::NAN)), "heading of the start in rad is out of range: NaN");
-    }
-}
+mod tests;

@@ -3,105 +3,44 @@
 //! Every turn is the shorter one. A point with a heading gets a last turn on its place. The plan is exact up to
 //! rounding: each leg starts where the legs before it really end, so that errors do not add up over many points.
 
-use axle_schema::plan::MAX_NOTES;
-use axle_schema::{Geometry, Leg, Metres, Plan, Pose, Radians, WayPoint};
+use crate::way::Way;
+use axle_schema::{Geometry, Metres, WayPoint};
 
-/// Turns smaller than this, in rad, are left out: they come from rounding, and a robot would stop for them. A line of
-/// 10 m then ends within 10 nm of its point.
-const LEAST_TURN: f64 = 1e-9;
-
-/// The plan from `start` through all `points`, which are checked already.
-pub(crate) fn plan(merge: Metres, start: Pose, points: &[WayPoint]) -> Plan {
-    let mut way = Way { at: start, place: None, legs: Vec::new(), repeated: Repeated::default() };
-    for (index, point) in points.iter().enumerate() {
-        way.visit(merge, index, point);
-    }
-    let length = way.legs.iter().map(|leg| leg.geometry.length()).sum();
-    Plan { start, legs: way.legs, length, notes: way.repeated.into_notes() }
-}
-
-/// The plan while it is being made.
-struct Way {
-    /// Where the legs so far end.
-    at: Pose,
-    /// The number of the point that is there, counted from 1; none at the start.
-    place: Option<usize>,
-    legs: Vec<Leg>,
-    repeated: Repeated,
-}
-
-impl Way {
-    fn visit(&mut self, merge: Metres, index: usize, point: &WayPoint) {
-        let distance = point.distance(self.at);
-        if distance.0 > merge.0 {
-            let bearing = (point.y.0 - self.at.y.0).atan2(point.x.0 - self.at.x.0);
-            self.turn_to(bearing, index, point);
-            // After the turn, so that the line is as long as the place where it begins asks for.
-            self.add(Geometry::Line { length: point.distance(self.at) }, index, point);
-            self.place = Some(index + 1);
-        } else {
-            self.repeated.note(index + 1, self.place, point);
-        }
-        if let Some(heading) = point.heading {
-            self.turn_to(heading.0, index, point);
-        }
-    }
-
-    fn turn_to(&mut self, direction: f64, index: usize, point: &WayPoint) {
-        let angle = Radians(direction - self.at.heading.0).wrapped();
-        if angle.0.abs() >= LEAST_TURN {
-            self.add(Geometry::Turn { angle }, index, point);
-        }
-    }
-
-    fn add(&mut self, geometry: Geometry, index: usize, point: &WayPoint) {
-        #[allow(clippy::cast_possible_truncation, reason = "a way task has at most MAX_POINTS points")]
-        self.legs.push(Leg { geometry, point: index as u32, speed: point.speed });
-        self.at = geometry.end_from(self.at);
+/// Visits all points, with the numbers that they have in the question.
+pub(crate) fn plan(way: &mut Way, merge: Metres, points: &[(usize, WayPoint)]) {
+    for (index, point) in points {
+        visit(way, merge, *index, point);
     }
 }
 
-/// Points that were visited without moving.
-#[derive(Default)]
-struct Repeated {
-    notes: Vec<String>,
-    count: usize,
-}
-
-impl Repeated {
-    fn note(&mut self, number: usize, place: Option<usize>, point: &WayPoint) {
-        self.count += 1;
-        // The last place is for the count of those that have no note of their own.
-        if self.notes.len() + 1 < MAX_NOTES {
-            let (x, y) = (point.x, point.y);
-            self.notes.push(match place {
-                Some(place) => {
-                    format!(
-                        "way point {number} repeats the place of way point {place} ({x}, {y}): visited once"
-                    )
-                }
-                None => format!("way point {number} is where the robot starts ({x}, {y}): nothing to drive"),
-            });
-        }
+/// Visits one point.
+pub(crate) fn visit(way: &mut Way, merge: Metres, index: usize, point: &WayPoint) {
+    if way.sets_out(merge, index, point) {
+        way.turn_towards(index, point);
+        // After the turn, so that the line is as long as the place where it begins asks for.
+        way.add(Geometry::Line { length: point.distance(way.at()) }, index, point);
+        way.arrived(index);
     }
-
-    fn into_notes(mut self) -> Vec<String> {
-        let rest = self.count - self.notes.len();
-        if rest > 0 {
-            self.notes.push(format!("{rest} more way points repeat the place before them: visited once"));
-        }
-        self.notes
+    if let Some(heading) = point.heading {
+        way.turn_to(heading.0, index, point);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use axle_schema::{Message as _, MetresPerSecond};
+    use axle_schema::plan::MAX_NOTES;
+    use axle_schema::{Message as _, MetresPerSecond, Plan, Pose, Radians};
     use proptest::prelude::*;
     use std::f64::consts::{FRAC_PI_2, PI};
 
     const MERGE: Metres = Metres(1e-3);
+
+    fn plan(merge: Metres, start: Pose, points: &[WayPoint]) -> Plan {
+        let mut way = Way::new(start);
+        super::plan(&mut way, merge, &points.iter().copied().enumerate().collect::<Vec<_>>());
+        way.into_plan()
+    }
 
     fn at(points: &[(f64, f64)]) -> Vec<WayPoint> {
         points.iter().map(|&(x, y)| WayPoint::at(x, y)).collect()
