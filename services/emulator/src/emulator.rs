@@ -5,19 +5,23 @@ use crate::ground::Ground;
 use crate::motors::{Motors, Turned};
 use crate::random::Random;
 use crate::sensors::Sensors;
+use crate::walls::Walls;
 use axle_schema::contract::Bounds as _;
 use axle_schema::dwm::MAX_WHEEL_SPEED;
 use axle_schema::{
-    Dwm, EncodersData, InertialData, Metres, MetresPerSecond, NavigatorData, Pose, RadiansPerSecond, Refusal,
-    Seconds, Sides, Twist,
+    Dwm, EncodersData, InertialData, MapData, Metres, MetresPerSecond, NavigatorData, Pose, RadiansPerSecond,
+    Refusal, Seconds, Sides, Track, Twist,
 };
 
 /// A robot in software, which stands at first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Emulator {
     params: EmulatorParams,
+    /// How far apart its wheels really are.
+    track: Track,
     motors: Motors,
     ground: Ground,
+    walls: Option<Walls>,
     sensors: Sensors,
     jitter: Random,
     now: Seconds,
@@ -26,6 +30,8 @@ pub struct Emulator {
     distances: Sides<Metres>,
     /// How fast the wheels move the robot now, but for the jitter.
     speeds: Sides<MetresPerSecond>,
+    /// On which side of its front a wall holds it.
+    bump: Sides<bool>,
 }
 
 impl Emulator {
@@ -44,16 +50,28 @@ impl Emulator {
             .map(|gain| gain + params.motors.gain_deviation * body.normal().clamp(-3.0, 3.0));
         let gyro_bias = params.gyro.bias + params.gyro.bias_deviation * body.normal();
         Ok(Self {
+            track: Track::new(Metres(params.robot.track.get() * params.wheels.track))?,
             params,
             motors: Motors::new(&params, gains),
             ground: Ground::new(params.slip, seed),
+            walls: None,
             sensors: Sensors::new(&params, gyro_bias, params.start),
             jitter: Random::new(seed, 1),
             now: Seconds::ZERO,
             pose: params.start,
             distances: Sides::default(),
             speeds: Sides::default(),
+            bump: Sides::default(),
         })
+    }
+
+    /// The same robot among the walls of a map. It stands where its parameters say, and that is not looked at.
+    ///
+    /// # Errors
+    /// Refuses what is no map.
+    pub fn among(self, map: &MapData) -> Result<Self, Refusal> {
+        let walls = Some(Walls::of(map, self.params.walls)?);
+        Ok(Self { walls, ..self })
     }
 
     /// Moves on to time `to`; the setpoints of the wheels go linearly from the last ones to `speeds`.
@@ -66,17 +84,31 @@ impl Emulator {
         if !(duration.is_finite() && duration.0 > 1e-9) {
             return;
         }
-        let Turned { start, end, bulge } = self.motors.turn(speeds.map(possible), duration, to);
+        let channels = speeds.map(|speed| possible(speed).0);
+        let asked = self.params.motors.wiring.to_wheels(channels).map(MetresPerSecond);
+        let Turned { start, end, bulge } = self.motors.turn(asked, duration, to);
         let jitter = start.zip(end, |v0, v1| self.jitters((v0 + v1) / 2.0 * duration) / duration);
         let extra = jitter.zip(bulge, |jitter, bulge| jitter + bulge);
         let (start, rim) = (start.zip(extra, |v, e| v + e), end.zip(extra, |v, e| v + e));
         let covered = start.zip(rim, |v0, v1| (v0 + v1) / 2.0 * duration);
         let (start, over_ground) = self.ground.holds(start, rim, covered);
         let Ok(moved) = Dwm::new(start, over_ground, duration) else { return };
-        self.pose = moved.pose_at(self.pose, self.params.robot.track, duration);
+        let to_pose = moved.pose_at(self.pose, self.track, duration);
+        let held = self.walls.as_ref().map(|walls| walls.hold(self.pose, to_pose));
+        let is_held = held.is_some_and(|held| held != to_pose);
+        self.bump = match &self.walls {
+            Some(walls) if is_held => walls.sides(self.pose, to_pose),
+            _ => Sides::default(),
+        };
+        self.pose = held.unwrap_or(to_pose);
         self.distances = self.distances.zip(covered, |sum, span| sum + span);
         // The jitter is no speed: it is what chance adds to the distance.
         self.speeds = over_ground.zip(extra, |v, e| v - e);
+        if is_held {
+            // Its wheels spin, and at most it turns.
+            let half = (self.speeds.right - self.speeds.left) / 2.0;
+            self.speeds = Sides::new(-half, half);
+        }
         self.now = to;
     }
 
@@ -95,7 +127,8 @@ impl Emulator {
     /// for their noise.
     #[must_use]
     pub fn encoders(&mut self) -> EncodersData {
-        self.sensors.encoders(self.now, self.distances)
+        let counted = self.distances.zip(self.params.wheels.size, |distance, size| distance / size);
+        self.sensors.encoders(self.now, counted)
     }
 
     /// What gyroscope and accelerometers measure: the means since their latest reading, with bias and noise.
@@ -103,6 +136,25 @@ impl Emulator {
     pub fn inertial(&mut self) -> InertialData {
         let truth = self.truth();
         self.sensors.inertial(&truth)
+    }
+
+    /// Where it runs against a wall with its front.
+    #[must_use]
+    pub const fn bump(&self) -> Sides<bool> {
+        self.bump
+    }
+
+    /// What its battery gives now, as a share of what it gives when it is full and nobody drives.
+    #[must_use]
+    pub const fn battery(&self) -> f64 {
+        self.motors.power()
+    }
+
+    /// The speed that a wheel is asked for by a full signal: a fifth more than its gate lets through, so that what friction
+    /// and weak motors take can be made up for.
+    #[must_use]
+    pub fn full_speed(&self) -> MetresPerSecond {
+        self.params.robot.wheel_speed * 1.2
     }
 
     /// Where the robot really is. The speeds leave the jitter out.
@@ -119,7 +171,7 @@ impl Emulator {
 
     fn twist(&self) -> Twist {
         let Sides { left, right } = self.speeds;
-        let omega = RadiansPerSecond((right - left).0 / self.params.robot.track.get());
+        let omega = RadiansPerSecond((right - left).0 / self.track.get());
         Twist { v: (left + right) / 2.0, omega }
     }
 }
@@ -136,8 +188,9 @@ const fn possible(speed: MetresPerSecond) -> MetresPerSecond {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{AccelerometersParams, EncodersParams, GyroParams, MotorsParams, SlipParams};
+    use crate::{AccelerometersParams, EncodersParams, GyroParams, MotorsParams, SlipParams, WheelsParams};
     use axle_schema::MetresPerSecondSquared;
+    use axle_schema::calibration::Wiring;
     use proptest::prelude::*;
 
     fn speeds(left: f64, right: f64) -> Sides<MetresPerSecond> {
@@ -234,6 +287,26 @@ mod tests {
     }
 
     #[test]
+    fn wheels_of_another_size_and_crossed_cables_are_what_a_calibration_finds() {
+        let crossed = Wiring { swapped: true, inverted: Sides::new(false, true) };
+        let params = EmulatorParams {
+            wheels: WheelsParams { track: 1.1, size: Sides::new(1.25, 0.8) },
+            encoders: EncodersParams { wiring: crossed, ..EncodersParams::default() },
+            motors: MotorsParams { wiring: crossed, ..perfect().params.motors },
+            ..perfect().params
+        };
+        let mut robot = Emulator::new(params).expect("a robot");
+        // The left channel drives the right wheel, backward.
+        for beat in 1..=1000_u32 {
+            robot.advance(Seconds(f64::from(beat) * 0.001), speeds(-0.5, 0.2));
+        }
+        let truth = robot.truth();
+        assert!((truth.pose.heading.0 - 0.3 / 0.33).abs() < 1e-3, "{truth:?}");
+        let counted = robot.encoders();
+        assert!((counted.left.0 + 0.5 / 0.8).abs() < 0.002 && (counted.right.0 - 0.2 / 1.25).abs() < 0.002);
+    }
+
+    #[test]
     fn a_slip_moves_the_robot_less_than_its_encoders_say() {
         let slip = SlipParams { rate: 1.0, ..SlipParams::default() };
         let mut robot = Emulator::new(EmulatorParams { slip, ..perfect().params }).expect("a robot");
@@ -244,6 +317,51 @@ mod tests {
         assert!((counted.left.0 - 2.4998).abs() < 0.001, "{counted:?}");
         let pose = robot.truth().pose;
         assert!(pose.x.0 < 2.49 && pose.heading.0.abs() > 1e-3, "{pose:?}");
+    }
+
+    #[test]
+    fn an_encoder_whose_cable_comes_off_shows_its_last_reading() {
+        let stuck = Sides::new(Metres(0.5), Metres::ZERO);
+        let noise = Metres(0.001);
+        let encoders = EncodersParams { stuck, noise, ..perfect().params.encoders };
+        let mut robot = Emulator::new(EmulatorParams { encoders, ..perfect().params }).expect("a robot");
+        let mut counted = robot.encoders();
+        for beat in 1..=200_u32 {
+            robot.advance(Seconds(f64::from(beat) * 0.01), speeds(-0.4, -0.4));
+            counted = robot.encoders();
+        }
+        assert!((counted.left.0 + 0.5).abs() < 0.005 && (counted.right.0 + 0.8).abs() < 0.005, "{counted:?}");
+        assert_eq!(robot.encoders().left, counted.left, "not even its noise is read");
+        assert!(robot.truth().pose.heading.0.abs() < 1e-9, "only what is counted differs");
+    }
+
+    #[test]
+    fn a_wall_stops_the_robot_and_not_its_wheels() {
+        // A room of 3 m, with the robot in its middle.
+        let cells = vec![0; 900];
+        let grid = axle_maps::Grid::new("room", Metres(0.1), Pose::new(-1.5, -1.5, 0.0), 30, cells);
+        let map = grid.and_then(|grid| grid.to_data()).expect("a map");
+        let mut robot = perfect().among(&map).expect("a robot");
+        let mut time = 0.0;
+        let mut drive = |robot: &mut Emulator, seconds: u32, left: f64, right: f64| {
+            for _ in 0..seconds * 200 {
+                time += 0.005;
+                robot.advance(Seconds(time), speeds(left, right));
+            }
+        };
+        drive(&mut robot, 5, 0.5, 0.5);
+        let truth = robot.truth();
+        // The wall is 1.5 m ahead, the body reaches 0.2 m: it stands at 1.3 m, and its encoders say 2.5 m.
+        assert!((truth.pose.x.0 - 1.3).abs() < 0.003, "{truth:?}");
+        assert!(robot.encoders().left.0 > 2.4 && truth.twist.expect("a twist").v.0.abs() < 1e-12);
+        assert_eq!(robot.bump(), Sides::new(true, true), "straight before it");
+        drive(&mut robot, 1, -0.3, 0.3);
+        assert_eq!(robot.bump(), Sides::default(), "on the spot it pushes nothing");
+        assert!(robot.truth().pose.heading.0 > 1.5, "it can turn: {:?}", robot.truth());
+        drive(&mut robot, 1, 0.0, 0.0);
+        drive(&mut robot, 2, 0.4, 0.4);
+        let away = robot.truth().pose;
+        assert!(away.x.0 < 1.05 && away.y.0 > 0.5, "and leave: {away:?}");
     }
 
     #[test]

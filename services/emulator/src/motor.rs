@@ -26,6 +26,8 @@ pub struct MotorParams {
     pub lag: Seconds,
     /// Standard deviation of the gain around 1, 0 to 0.1.
     pub gain_deviation: f64,
+    /// Whether it has an encoder; without one, a service `encoder-…` has to say what the wheel does.
+    pub encoder: bool,
     /// Distance of the rim from tick to tick of the encoder, 1e-6 to 0.1 m.
     pub tick: Metres,
     /// Readings in a second, 20 to 200.
@@ -43,6 +45,7 @@ impl Default for MotorParams {
             full_speed: MetresPerSecond(1.2),
             lag: Seconds(0.05),
             gain_deviation: 0.03,
+            encoder: true,
             tick: Metres(0.0005),
             rate: 100.0,
             max_age: Seconds(0.25),
@@ -133,6 +136,13 @@ impl Motor {
         Ok(())
     }
 
+    /// Turns with this power from now on, whoever gives it: the shaft of a motor that another process drives.
+    pub(crate) fn follow(&mut self, now: Seconds, power: Duty) {
+        self.advance(now);
+        self.power = power;
+        self.heard = Some((self.now, 0));
+    }
+
     /// Takes the power away, for whoever ends the process.
     pub fn stop(&mut self) {
         self.power = Duty::default();
@@ -175,7 +185,7 @@ impl Motor {
             boot: self.boot,
             stamp: self.now,
             power: Some(self.power),
-            distance: Some(Metres(tick * (self.distance / tick).floor())),
+            distance: self.params.encoder.then(|| Metres(tick * (self.distance / tick).floor())),
         }
     }
 }
@@ -242,6 +252,13 @@ mod tests {
         // After the silence the same words are too old, though their age would be right.
         assert_eq!(motor.hear(Seconds(1.21), &order(5, 0.99, 1.0)), Err(Reject::Stale));
         assert_eq!(motor.hear(Seconds(1.22), &order(1, 1.2, 0.1)), Ok(()), "a new sender counts anew");
+    }
+
+    #[test]
+    fn a_motor_without_an_encoder_says_no_distance() {
+        let params = MotorParams { encoder: false, ..MotorParams::default() };
+        let reading = Motor::new(params, BOOT, 0).expect("a motor").reading();
+        assert_eq!((reading.distance, reading.power), (None, Some(Duty::default())));
     }
 
     #[test]

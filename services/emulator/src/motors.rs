@@ -1,6 +1,7 @@
 //! The motors: from the speed that a wheel is asked for to the speed that its rim has.
 
 use crate::params::{BatteryParams, EmulatorParams, MotorsParams};
+use crate::response::Memory;
 use axle_schema::{MetresPerSecond, Seconds, Sides};
 
 /// The least share of its speed that an empty battery leaves to a wheel.
@@ -9,11 +10,16 @@ const LAST: f64 = 0.1;
 /// What a wheel is slower or faster than its target by, in m/s, when it has reached it.
 const NOTHING: f64 = 1e-9;
 
+/// A wheel that is slower than this, in m/s, stands as far as friction at rest is concerned.
+const STANDING: f64 = 1e-4;
+
 /// Two motors on one battery.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Motors {
     params: MotorsParams,
     battery: BatteryParams,
+    /// What the battery gives now, as a share of what it gives when it is full and nobody drives.
+    power: f64,
     /// The speed at which the sag of the battery is told.
     full: MetresPerSecond,
     /// How much faster than asked each wheel drives: the same all its life.
@@ -22,6 +28,8 @@ pub(crate) struct Motors {
     target: Sides<MetresPerSecond>,
     /// How fast they run.
     rim: Sides<MetresPerSecond>,
+    /// What motors remember whose response is a polynomial.
+    memory: Sides<Memory>,
 }
 
 /// What the rims do in an interval.
@@ -39,16 +47,23 @@ impl Motors {
         Self {
             params: params.motors,
             battery: params.battery,
+            power: 1.0,
             full: params.robot.wheel_speed,
             gains,
             target: Sides::default(),
             rim: Sides::default(),
+            memory: Sides::default(),
         }
     }
 
     /// How fast the rims run.
     pub(crate) const fn rim(&self) -> Sides<MetresPerSecond> {
         self.rim
+    }
+
+    /// What the battery gives now, as a share of what it gives when it is full and nobody drives.
+    pub(crate) const fn power(&self) -> f64 {
+        self.power
     }
 
     /// Moves on by `duration`, until the time `now` since boot; what is asked goes linearly to `asked`.
@@ -58,6 +73,18 @@ impl Motors {
     pub(crate) fn turn(&mut self, asked: Sides<MetresPerSecond>, duration: Seconds, now: Seconds) -> Turned {
         let (start, from) = (self.rim, self.target);
         self.target = self.targets(asked, now);
+        let response = self.params.response;
+        if response.time > Seconds::ZERO {
+            let change = self.target.zip(from, |to, from| (to - from).0);
+            let asked = change.zip(response.sides(), |change, coefficients| (change, coefficients));
+            let turned = |memory: &mut Memory, (change, coefficients): (f64, [f64; 5])| {
+                MetresPerSecond(memory.turn(change, duration.0, response.time.0, &coefficients))
+            };
+            let Sides { left, right } = &mut self.memory;
+            self.rim = Sides::new(turned(left, asked.left), turned(right, asked.right));
+            // Beats are short beside the response: the mean speed of one is the middle of its ends.
+            return Turned { start, end: self.rim, bulge: Sides::default() };
+        }
         let (lag, time) = (self.params.lag.0, duration.0);
         if lag > 0.0 {
             let decay = (-time / lag).exp();
@@ -78,11 +105,21 @@ impl Motors {
     }
 
     /// What the rims would run at in the long run.
-    fn targets(&self, asked: Sides<MetresPerSecond>, now: Seconds) -> Sides<MetresPerSecond> {
-        let free = asked.zip(self.gains, |speed, gain| self.rubbed(speed) * gain);
+    fn targets(&mut self, asked: Sides<MetresPerSecond>, now: Seconds) -> Sides<MetresPerSecond> {
+        let stuck = self.rim.zip(self.target, |rim, target| rim.0.abs() < STANDING && target.0 == 0.0);
+        let loose =
+            asked.zip(stuck.zip(self.params.breakaway, |s, b| (s, b)), |speed, (stuck, breakaway)| {
+                if stuck && speed.abs() < breakaway { MetresPerSecond::ZERO } else { self.rubbed(speed) }
+            });
+        let gains = self.gains.zip(self.params.backward, |gain, backward| (gain, backward));
+        let free = loose.zip(gains, |speed, (gain, backward)| {
+            // A product with 1 is exact.
+            speed * (gain * if speed.0 < 0.0 { backward } else { 1.0 })
+        });
         let BatteryParams { sag, drain } = self.battery;
         let load = (free.left.0.abs() + free.right.0.abs()) / (2.0 * self.full.0);
         let power = ((1.0 - sag * load) * (1.0 - drain * now.0 / 3600.0)).max(LAST);
+        self.power = power;
         let top = self.params.saturation.0;
         // A product with 1 is exact: without a battery that tires, nothing here changes a bit.
         free.map(|speed| MetresPerSecond((speed.0 * power).clamp(-top, top)))
@@ -135,6 +172,23 @@ mod tests {
             motors.turn(both(time), Seconds(0.001), Seconds(time));
         }
         assert!((motors.rim().right.0 - 0.95).abs() < 1e-6, "{:?}", motors.rim());
+    }
+
+    #[test]
+    fn a_standing_wheel_breaks_loose_later_than_a_running_one_stops() {
+        let mut motors = motors(|params| {
+            params.motors.dead_band = MetresPerSecond(0.02);
+            params.motors.breakaway = Sides::new(MetresPerSecond(0.05), MetresPerSecond(0.01));
+            params.motors.backward = Sides::new(1.0, 0.5);
+        });
+        let mut left = Vec::new();
+        for asked in [0.04, 0.06, 0.04, 0.01, 0.04] {
+            motors.turn(both(asked), Seconds(0.01), Seconds::ZERO);
+            left.push((motors.rim().left.0 * 1000.0).round());
+        }
+        assert_eq!(left, [0.0, 40.0, 20.0, 0.0, 0.0]);
+        motors.turn(both(-0.06), Seconds(0.01), Seconds::ZERO);
+        assert!((motors.rim().right.0 + 0.02).abs() < 1e-12, "half as fast backward: {:?}", motors.rim());
     }
 
     #[test]

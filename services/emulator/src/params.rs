@@ -1,5 +1,6 @@
 //! What of the emulated robot may be chosen.
 
+use crate::board::BoardParams;
 use axle_gate::GateParams;
 use axle_schema::contract::{Bounds, Params};
 use axle_schema::refusal::within;
@@ -8,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 mod body;
 mod senses;
-pub use body::{BatteryParams, MotorsParams, SlipParams};
+pub use body::{BatteryParams, MotorsParams, ResponseParams, SlipParams, WallsParams, WheelsParams};
 pub use senses::{AccelerometersParams, EncodersParams, GyroParams};
 
 /// Parameters of the emulator and of the gate before it.
@@ -27,16 +28,24 @@ pub struct EmulatorParams {
     pub start: Pose,
     /// How badly its motors obey.
     pub motors: MotorsParams,
+    /// How its wheels differ from what everybody believes.
+    pub wheels: WheelsParams,
+    /// Whether the calibration that is kept for this robot is applied.
+    pub calibrated: bool,
     /// What its battery gives.
     pub battery: BatteryParams,
     /// How its wheels slip.
     pub slip: SlipParams,
+    /// Whether walls stand in its way.
+    pub walls: WallsParams,
     /// How finely its encoders count.
     pub encoders: EncodersParams,
     /// How well its gyroscope measures.
     pub gyro: GyroParams,
     /// How well its accelerometers measure.
     pub accelerometers: AccelerometersParams,
+    /// What is odd about its board, where it is emulated with one.
+    pub board: BoardParams,
 }
 
 /// How often the emulated robot moves and speaks.
@@ -63,11 +72,15 @@ impl Default for EmulatorParams {
             rates: Rates::default(),
             start: Pose::default(),
             motors: MotorsParams::default(),
+            wheels: WheelsParams::default(),
+            calibrated: true,
             battery: BatteryParams::default(),
             slip: SlipParams::default(),
+            walls: WallsParams::default(),
             encoders: EncodersParams::default(),
             gyro: GyroParams::default(),
             accelerometers: AccelerometersParams::default(),
+            board: BoardParams::default(),
         }
     }
 }
@@ -88,11 +101,14 @@ impl Bounds for EmulatorParams {
         within("start.y in m", self.start.y.0, -1e4, 1e4)?;
         within("start.heading in rad", self.start.heading.0, -1e3, 1e3)?;
         self.motors.check()?;
+        self.wheels.check()?;
         self.battery.check()?;
         self.slip.check()?;
+        self.walls.check()?;
         self.encoders.check()?;
         self.gyro.check()?;
-        self.accelerometers.check()
+        self.accelerometers.check()?;
+        self.board.check()
     }
 }
 
@@ -127,8 +143,13 @@ mod tests {
             "[motors]\ngain_deviation = 0.5",
             "[motors]\ngain = { left = 0.0, right = 1.0 }",
             "[motors]\nlag = -0.1",
+            "[motors]\nbreakaway = { left = 0.0, right = 0.6 }",
+            "[motors.response]\ntime = 3.0",
+            "[wheels]\ntrack = 0.0",
+            "[wheels]\nsize = { left = 1.0, right = 2.0 }",
             "[battery]\nsag = 1.0",
             "[slip]\nshare = 1.5",
+            "[walls]\nbody = 0",
             "[gyro]\nbias = 1.0",
             "[accelerometers]\nnoise_deviation = -1",
             "[gate]\na_max = 1",

@@ -18,6 +18,11 @@ pub(crate) struct Sensors {
     gyro_drift: Random,
     encoder_noise: Random,
     accelerometer_noise: Random,
+    /// What each encoder counted last.
+    counted: Sides<Metres>,
+    /// What each wheel had covered then, and its way to and fro.
+    distances: Sides<Metres>,
+    way: Sides<Metres>,
     /// At the latest reading: time, true heading and true speed.
     read: (Seconds, Radians, MetresPerSecond),
 }
@@ -35,6 +40,9 @@ impl Sensors {
             gyro_drift: Random::new(params.seed, 5),
             encoder_noise: Random::new(params.seed, 6),
             accelerometer_noise,
+            counted: Sides::default(),
+            distances: Sides::default(),
+            way: Sides::default(),
             read: (Seconds::ZERO, start.heading, MetresPerSecond::ZERO),
         }
     }
@@ -42,13 +50,28 @@ impl Sensors {
     /// What the encoders count when the rims have covered `distances`: the last whole tick of each.
     pub(crate) fn encoders(&mut self, now: Seconds, distances: Sides<Metres>) -> EncodersData {
         let (tick, noise) = (self.params.encoders.tick, self.params.encoders.noise);
-        let read = |distance: Metres| {
+        let stuck = self.are_stuck(distances);
+        let mut read = |distance: Metres| {
             let noisy =
                 if noise > Metres::ZERO { distance + noise * self.encoder_noise.normal() } else { distance };
             tick * (noisy / tick).floor()
         };
-        let Sides { left, right } = distances.map(read);
+        let counts = distances.map(&mut read);
+        self.counted = Sides {
+            left: if stuck.left { self.counted.left } else { counts.left },
+            right: if stuck.right { self.counted.right } else { counts.right },
+        };
+        let wheels = self.counted.map(|distance| distance.0);
+        let Sides { left, right } = self.params.encoders.wiring.to_channels(wheels).map(Metres);
         EncodersData { stamp: now, left, right }
+    }
+
+    /// Whether each wheel has come so far that its encoder counts no more.
+    fn are_stuck(&mut self, distances: Sides<Metres>) -> Sides<bool> {
+        let changes = distances.zip(self.distances, |now, before| (now - before).abs());
+        self.distances = distances;
+        self.way = self.way.zip(changes, |way, change| way + change);
+        self.way.zip(self.params.encoders.stuck, |way, end| end > Metres::ZERO && way > end)
     }
 
     /// What gyroscope and accelerometers measure when the robot really does `truth`: the means since the latest

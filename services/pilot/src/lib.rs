@@ -25,6 +25,13 @@ pub struct PilotParams {
     pub deadline: Seconds,
     /// The corrector may be silent this long, 0.2 to 10 s.
     pub silence: Seconds,
+    /// Whether the robot is one of a fleet: it drives only where Traffic lets it.
+    pub traffic: bool,
+    /// The circle around the middle of the axle that the robot and its load never leave, 0.01 to 5 m. Pathfinder is
+    /// asked for ways with this much room, and Traffic needs it.
+    pub radius: Metres,
+    /// What Traffic gives and takes back at once, 0.1 to 10 m.
+    pub piece: Metres,
     /// The robot that plans are made for.
     pub robot: Drivetrain,
 }
@@ -36,6 +43,9 @@ impl Default for PilotParams {
             arrival: Metres(0.05),
             deadline: Seconds(5.0),
             silence: Seconds(1.5),
+            traffic: false,
+            radius: Drivetrain::BODY,
+            piece: Metres(0.5),
             robot: Drivetrain::default(),
         }
     }
@@ -46,6 +56,8 @@ impl Bounds for PilotParams {
         within("arrival in m", self.arrival.0, 1e-3, 1.0)?;
         within("deadline in s", self.deadline.0, 0.1, 60.0)?;
         within("silence in s", self.silence.0, 0.2, 10.0)?;
+        within("radius in m", self.radius.0, 0.01, 5.0)?;
+        within("piece in m", self.piece.0, 0.1, 10.0)?;
         self.robot.check()
     }
 }
@@ -67,6 +79,7 @@ pub struct Journey {
     accepted: Seconds,
     heard: Seconds,
     ended: Option<Seconds>,
+    waiting: Option<String>,
 }
 
 impl Journey {
@@ -84,6 +97,7 @@ impl Journey {
             accepted: at,
             heard: at,
             ended: None,
+            waiting: None,
         }
     }
     /// Names the task.
@@ -110,6 +124,12 @@ impl Journey {
         }
     }
 
+    /// The robot stands between two stages, for a reason that is known; the corrector has nothing to say.
+    pub fn stand(&mut self, waiting: Option<String>, at: Seconds) {
+        self.heard = at;
+        self.waiting = waiting;
+    }
+
     /// The robot is believed to be here. Points are reached in their order; one pose may reach several.
     pub fn see(&mut self, params: &PilotParams, pose: Pose) {
         self.pose = pose;
@@ -130,7 +150,7 @@ impl Journey {
         if said.task != self.task || self.phase.is_over() {
             return;
         }
-        self.heard = at;
+        (self.heard, self.waiting) = (at, None);
         self.fraction = said.fraction.clamp(self.fraction, 1.0);
         match &said.phase {
             Phase::Planning => {}
@@ -176,6 +196,7 @@ impl Journey {
             distance_left: self.distance_left(),
             fraction: if self.phase == Phase::Done { 1.0 } else { self.fraction },
             elapsed: self.ended.unwrap_or(at) - self.accepted,
+            waiting: self.waiting.clone().filter(|_| !self.phase.is_over()),
         }
     }
 
@@ -271,6 +292,17 @@ mod tests {
         );
         journey.hear(&params, &said(Phase::Running, 0.5), Seconds(11.8));
         assert!(journey.phase().is_over(), "a task ends once");
+    }
+
+    #[test]
+    fn a_robot_that_stands_for_a_reason_is_waited_for_and_says_it() {
+        let (params, mut journey) = (PilotParams::default(), journey());
+        let why = Some("for r5: it holds the way".to_owned());
+        journey.stand(why.clone(), Seconds(60.0));
+        journey.wait(&params, Seconds(61.0));
+        assert_eq!((journey.phase(), journey.progress(Seconds(61.0)).waiting), (&Phase::Running, why));
+        journey.hear(&params, &said(Phase::Running, 0.5), Seconds(61.1));
+        assert_eq!(journey.progress(Seconds(61.2)).waiting, None, "it drives");
     }
 
     #[test]

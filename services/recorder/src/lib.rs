@@ -16,15 +16,27 @@
 //! * The attachment of a sample stands just before it on a channel of its own, the key and `/@meta`, schema
 //!   `axle.Meta.v1`: sequence, source and cause are kept for replay and for "why did it do that".
 //! * Samples that never reached the recorder are counted on the channel [`GAP_TOPIC`], as JSON: `{"key": …, "lost": 3}`.
+//! * Beside them stand derived channels, marked so in their metadata, whose topics begin with `/`: poses, transforms,
+//!   paths, a scene and a log in Foxglove's well-known schemas, as JSON. Reading back leaves them out.
 //! * No compression: the file can be read by anything, and a crash cannot cut through a compressed block.
 
 pub mod cddl;
+mod copy;
+mod derived;
+mod foxglove;
+mod info;
 mod read;
+mod series;
 #[cfg(test)]
 mod tests;
 mod write;
 
+pub use copy::{CopyError, Part, copy};
+pub use derived::{Derived, Shown};
+pub use foxglove::View;
+pub use info::{Info, Stream};
 pub use read::{Account, Entry, ReadError, Recorded, Recording};
+pub use series::Series;
 pub use write::{RecordError, Recorder, Sample, Totals};
 
 use axle_schema::contract::{Bounds, Params};
@@ -37,6 +49,8 @@ use std::path::PathBuf;
 pub const GAP_TOPIC: &str = "@gap";
 /// What follows the key in the topic of its attachments.
 pub const META_SUFFIX: &str = "/@meta";
+/// What marks a derived channel in its metadata.
+pub const DERIVED: &str = "derived";
 /// The most channels of one recording, those of attachments included.
 pub const MAX_CHANNELS: usize = 4096;
 /// The largest payload that is recorded, in bytes; no message of Axle is larger than 5 MiB.
@@ -57,19 +71,37 @@ pub struct RecorderParams {
     pub file: Option<PathBuf>,
     /// The most time between two syncs to disk, 0.1 to 1 s: what a crash may lose.
     pub flush: Seconds,
-    /// The largest file, 0.001 to 1000 GB; a recording that reaches it ends.
+    /// The largest file, 0.001 to 1000 GB.
     pub file_gb: f64,
+    /// How many files a recording may have, 1 to 10000. When the newest is full, a further one is begun and the oldest is
+    /// removed; with 1, the recording ends.
+    pub files: u32,
+    /// A further file is begun after so many minutes too, 0.01 to 100000, if there may be several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file_minutes: Option<f64>,
+    /// Whether what Foxglove can show by itself is written beside the data.
+    pub derived: bool,
 }
 
 impl Default for RecorderParams {
     fn default() -> Self {
-        Self { directory: "recordings".into(), file: None, flush: Seconds(1.0), file_gb: 4.0 }
+        Self {
+            directory: "recordings".into(),
+            file: None,
+            flush: Seconds(1.0),
+            file_gb: 4.0,
+            files: 1,
+            file_minutes: None,
+            derived: true,
+        }
     }
 }
 impl Bounds for RecorderParams {
     fn check(&self) -> Result<(), Refusal> {
         within("flush in s", self.flush.0, 0.1, 1.0)?;
-        within("file_gb in GB", self.file_gb, 0.001, 1000.0)
+        within("file_gb in GB", self.file_gb, 0.001, 1000.0)?;
+        within("files", f64::from(self.files), 1.0, 10_000.0)?;
+        self.file_minutes.map_or(Ok(()), |minutes| within("file_minutes", minutes, 0.01, 100_000.0))
     }
 }
 impl Params for RecorderParams {

@@ -4,10 +4,9 @@
 //! checksum is wrong is left out and counted, one that was cut off gives the messages before the cut, and nothing is
 //! asked of the index at the end, which a crash does not leave. Memory is bounded by the largest record.
 
-use crate::{GAP_TOPIC, META_SUFFIX};
+use crate::{DERIVED, GAP_TOPIC, META_SUFFIX};
 use mcap::records::{Record, op};
-use std::collections::HashMap;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -101,6 +100,8 @@ enum Kind {
     Payload,
     Meta,
     Gap,
+    /// Made from what stands beside it.
+    Derived,
 }
 
 /// A recording that is read: an iterator over its entries.
@@ -113,6 +114,7 @@ pub struct Recording {
     waiting: Option<(Arc<str>, u32, u64, Vec<u8>)>,
     ready: VecDeque<Entry>,
     account: Account,
+    about: BTreeMap<String, String>,
     /// Whether chunks have come: then nothing is expected outside them.
     chunked: bool,
     over: bool,
@@ -147,6 +149,7 @@ impl Recording {
             waiting: None,
             ready: VecDeque::new(),
             account: Account::default(),
+            about: BTreeMap::new(),
             chunked: false,
             over: false,
         };
@@ -160,6 +163,12 @@ impl Recording {
     #[must_use]
     pub const fn account(&self) -> &Account {
         &self.account
+    }
+
+    /// What the file says of itself; known when its first sample is.
+    #[must_use]
+    pub const fn about(&self) -> &BTreeMap<String, String> {
+        &self.about
     }
 
     fn cut(&mut self, why: &str) {
@@ -274,8 +283,8 @@ impl Recording {
 
     /// Takes one record; whether it makes sense.
     fn record(&mut self, opcode: u8, body: &[u8]) -> bool {
-        // Only these three are parsed: the others say nothing that a reader without an index needs.
-        if !matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
+        // Only these are parsed: the others say nothing that a reader without an index needs.
+        if !matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA) {
             return true;
         }
         match mcap::read::parse_record(opcode, body) {
@@ -290,6 +299,12 @@ impl Recording {
                 self.channels.insert(known.0, known.1);
                 true
             }
+            Ok(Record::Metadata(metadata)) => {
+                if metadata.name == "axle" && self.about.is_empty() {
+                    self.about = metadata.metadata;
+                }
+                true
+            }
             Ok(Record::Message { header, data }) => self.message(&header, &data),
             _ => false,
         }
@@ -298,6 +313,8 @@ impl Recording {
     fn known(&self, channel: mcap::records::Channel) -> (u16, Known) {
         let kind = if channel.topic == GAP_TOPIC {
             Kind::Gap
+        } else if channel.metadata.contains_key(DERIVED) {
+            Kind::Derived
         } else if channel.topic.ends_with(META_SUFFIX) {
             Kind::Meta
         } else {
@@ -305,7 +322,7 @@ impl Recording {
         };
         let topic = match kind {
             Kind::Meta => channel.topic.strip_suffix(META_SUFFIX).unwrap_or(&channel.topic),
-            Kind::Payload | Kind::Gap => &channel.topic,
+            Kind::Payload | Kind::Gap | Kind::Derived => &channel.topic,
         };
         // Recordings of others have no encoding in their metadata: it is put together from what they have.
         let encoding = channel.metadata.get("encoding").cloned().unwrap_or_else(|| {
@@ -320,6 +337,7 @@ impl Recording {
         let Some(known) = self.channels.get(&header.channel_id) else { return false };
         let (topic, encoding, at) = (Arc::clone(&known.topic), Arc::clone(&known.encoding), header.log_time);
         match known.kind {
+            Kind::Derived => {}
             Kind::Meta => self.waiting = Some((topic, header.sequence, at, data.to_vec())),
             Kind::Payload => {
                 let fits = |(key, sequence, received, _): &(Arc<str>, u32, u64, Vec<u8>)| {

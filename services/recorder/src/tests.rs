@@ -1,5 +1,7 @@
 //! What is written comes back, whatever happens to the file.
 
+mod shown;
+
 use super::*;
 use axle_schema::meta::{Cause, Meta};
 use axle_schema::{Boot, Dwm, Message, encode};

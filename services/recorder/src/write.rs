@@ -1,6 +1,9 @@
 //! Writing: samples into chunks, chunks onto the disk.
 
-use crate::{CHUNK, GAP_TOPIC, MAX_CHANNELS, MAX_NAME, MAX_PAYLOAD, META_SUFFIX, RecorderParams, cddl};
+use crate::derived::{Derived, Shown};
+use crate::{
+    CHUNK, DERIVED, GAP_TOPIC, MAX_CHANNELS, MAX_NAME, MAX_PAYLOAD, META_SUFFIX, RecorderParams, cddl,
+};
 use axle_schema::codec::schema_of;
 use axle_schema::meta::Meta;
 use mcap::records::MessageHeader;
@@ -122,6 +125,7 @@ pub struct Recorder {
     period: u64,
     limit: u64,
     totals: Totals,
+    derived: Option<Derived>,
 }
 
 impl Recorder {
@@ -173,6 +177,7 @@ impl Recorder {
             period: billionths(params.flush.0),
             limit: billionths(params.file_gb),
             totals: Totals::default(),
+            derived: params.derived.then(Derived::default),
         };
         // A full disk is better known now than in a second.
         recorder.flush(now)?;
@@ -208,10 +213,37 @@ impl Recorder {
         self.put(header, sample.payload)?;
         self.totals.samples += 1;
         self.totals.bytes += (sample.payload.len() + sample.attachment.map_or(0, <[u8]>::len)) as u64;
+        let shown = self.derived.as_mut().map(|derived| derived.of(&sample)).unwrap_or_default();
+        for shown in shown {
+            self.show(&shown, sample.received)?;
+        }
         if self.pending >= CHUNK {
             self.flush(sample.received)?;
         }
         Ok(())
+    }
+
+    /// Writes a derived message. One for which the file has no channel left is not missed.
+    fn show(&mut self, shown: &Shown, now: u64) -> Result<(), RecordError> {
+        let name = shown.view.name();
+        let known = self.channels.get(&shown.topic).and_then(|encodings| encodings.get(name)).copied();
+        let channel_id = match known {
+            Some(pair) => pair.payload,
+            None => {
+                let schema = shown.view.schema();
+                let about = BTreeMap::from([(DERIVED.to_owned(), "true".to_owned())]);
+                let schema = Some((name, "jsonschema", schema.as_bytes()));
+                let payload = match self.channel(&shown.topic, "json", schema, &about) {
+                    Err(RecordError::TooManyChannels { .. }) => return Ok(()),
+                    other => other?,
+                };
+                let pair = Pair { payload, meta: None };
+                self.channels.entry(shown.topic.clone()).or_default().insert(name.to_owned(), pair);
+                payload
+            }
+        };
+        let header = MessageHeader { channel_id, sequence: 0, log_time: now, publish_time: now };
+        self.put(header, shown.json.to_string().as_bytes())
     }
 
     /// Records that `lost` samples of `key` never came, known at the time `now`.

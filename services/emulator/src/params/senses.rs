@@ -1,8 +1,9 @@
 //! How well the encoders, the gyroscope and the accelerometers measure.
 
+use axle_schema::calibration::Wiring;
 use axle_schema::contract::Bounds;
 use axle_schema::refusal::within;
-use axle_schema::{Metres, MetresPerSecondSquared, RadiansPerSecond, Refusal};
+use axle_schema::{Metres, MetresPerSecondSquared, RadiansPerSecond, Refusal, Sides};
 use serde::{Deserialize, Serialize};
 
 /// How finely the encoders count.
@@ -13,6 +14,11 @@ pub struct EncodersParams {
     pub tick: Metres,
     /// Standard deviation of the noise of a reading, before it is cut to whole ticks, 0 to 0.1 m.
     pub noise: Metres,
+    /// How the encoders are connected.
+    pub wiring: Wiring,
+    /// The way of each wheel, to and fro, after which its encoder counts no more, as one does whose cable has come off;
+    /// 0 to 1e6 m, and 0 for one that counts for ever.
+    pub stuck: Sides<Metres>,
 }
 
 /// How well the gyroscope measures.
@@ -42,7 +48,12 @@ pub struct AccelerometersParams {
 impl Default for EncodersParams {
     /// A wheel of 64 mm with 400 ticks in a turn.
     fn default() -> Self {
-        Self { tick: Metres(0.0005), noise: Metres::ZERO }
+        Self {
+            tick: Metres(0.0005),
+            noise: Metres::ZERO,
+            wiring: Wiring::default(),
+            stuck: Sides::new(Metres::ZERO, Metres::ZERO),
+        }
     }
 }
 impl Default for GyroParams {
@@ -64,7 +75,9 @@ impl Default for AccelerometersParams {
 impl Bounds for EncodersParams {
     fn check(&self) -> Result<(), Refusal> {
         within("encoders.tick in m", self.tick.0, 1e-6, 0.1)?;
-        within("encoders.noise in m", self.noise.0, 0.0, 0.1)
+        within("encoders.noise in m", self.noise.0, 0.0, 0.1)?;
+        within("encoders.stuck.left in m", self.stuck.left.0, 0.0, 1e6)?;
+        within("encoders.stuck.right in m", self.stuck.right.0, 0.0, 1e6)
     }
 }
 impl Bounds for GyroParams {
