@@ -2,10 +2,13 @@
 //!
 //! Plain zenohd can take its place. This one adds what the mesh relies on: link settings that agree with those of the
 //! clients, no discovery by multicast, loopback by default, and an error that says which port is taken.
-//! Access control and TLS come with the topology; until then a router that listens beyond loopback must be asked for
-//! by name.
+//!
+//! With an identity it listens in TLS, asks everybody for a certificate, and lets each owner do what its access rules
+//! say and nothing else. Without one, listening beyond loopback must be asked for by name.
 
-use axle_mesh::config::{LINK, check_endpoint};
+use axle_mesh::Link;
+use axle_mesh::config::LINK;
+use axle_mesh::identity::SECURE;
 use std::net::{TcpListener, ToSocketAddrs as _};
 use zenoh::{Config, Session, Wait as _};
 
@@ -40,13 +43,18 @@ pub enum RouterFault {
     },
     /// Listening beyond this computer without encryption.
     #[error(
-        "{endpoint} can be reached from other computers, and nothing on it is encrypted or authenticated; to listen \
-         there all the same, add --insecure-lan"
+        "{endpoint} can be reached from other computers, and nothing on it is encrypted or authenticated; give the \
+         router an identity (`axle keys`), or, to listen there all the same, add --insecure-lan"
     )]
     Exposed {
         /// The endpoint.
         endpoint: String,
     },
+    /// Certificates without rules would let everybody who has one do everything.
+    #[error(
+        "a router with an identity needs access rules; write them with `axle keys issue --topology FILE`"
+    )]
+    NoRules,
     /// A setting that Zenoh refuses.
     #[error("configure the router: {key}")]
     Config {
@@ -68,12 +76,16 @@ pub enum RouterFault {
 /// Where a router listens, and which routers it links to.
 #[derive(Clone, Debug, Default)]
 pub struct RouterSettings {
-    /// Endpoints to listen on, `tcp/host:port`.
+    /// Endpoints to listen on, `tcp/host:port` or `tls/host:port`.
     pub listen: Vec<String>,
     /// Endpoints of routers on other computers; they are tried for ever.
     pub connect: Vec<String>,
     /// Allows to listen beyond loopback without encryption.
     pub insecure_lan: bool,
+    /// How it holds its links.
+    pub link: Link,
+    /// With an identity, who may do what: the `access_control` of Zenoh, as JSON5.
+    pub access: Option<String>,
 }
 
 /// A running router; dropping it stops it.
@@ -87,11 +99,14 @@ impl Router {
     /// # Errors
     /// A [`RouterFault`] that names the endpoint.
     pub fn start(settings: &RouterSettings) -> Result<Self, RouterFault> {
+        for endpoint in settings.listen.iter().chain(&settings.connect) {
+            settings.link.check(endpoint).map_err(RouterFault::Endpoint)?;
+        }
         for endpoint in &settings.listen {
             probe(endpoint, settings.insecure_lan)?;
         }
-        for endpoint in &settings.connect {
-            check_endpoint(endpoint).map_err(RouterFault::Endpoint)?;
+        if settings.link.identity.is_some() && settings.access.is_none() {
+            return Err(RouterFault::NoRules);
         }
         let mut config = Config::default();
         let list = |endpoints: &[String]| {
@@ -111,7 +126,8 @@ impl Router {
             ("scouting/delay", "0".to_owned()),
         ];
         let shared = LINK.iter().map(|(key, value)| (*key, (*value).to_owned()));
-        for (key, value) in own.into_iter().chain(shared) {
+        let access = settings.access.iter().map(|rules| ("access_control", rules.clone()));
+        for (key, value) in own.into_iter().chain(shared).chain(settings.link.settings()).chain(access) {
             config.insert_json5(key, &value).map_err(|source| RouterFault::Config { key, source })?;
         }
         let endpoints = settings.listen.join(", ");
@@ -128,13 +144,13 @@ impl Router {
 
 /// Finds out before Zenoh does, and says more clearly, what is wrong with an endpoint.
 fn probe(endpoint: &str, insecure_lan: bool) -> Result<(), RouterFault> {
-    check_endpoint(endpoint).map_err(RouterFault::Endpoint)?;
-    let address = endpoint.trim_start_matches("tcp/");
+    let address = endpoint.trim_start_matches("tcp/").trim_start_matches(SECURE);
     let addresses: Vec<_> = address
         .to_socket_addrs()
         .map_err(|source| RouterFault::Unresolved { endpoint: endpoint.to_owned(), source })?
         .collect();
-    if !insecure_lan && addresses.iter().any(|address| !address.ip().is_loopback()) {
+    let is_plain = !endpoint.starts_with(SECURE);
+    if is_plain && !insecure_lan && addresses.iter().any(|address| !address.ip().is_loopback()) {
         return Err(RouterFault::Exposed { endpoint: endpoint.to_owned() });
     }
     TcpListener::bind(&addresses[..])
@@ -156,6 +172,7 @@ mod tests {
         check("127.0.0.1:7447", "is not an endpoint");
         check("tcp/127.0.0.1:99999", "is not an endpoint");
         check("tcp/0.0.0.0:7447", "--insecure-lan");
+        check("tls/0.0.0.0:7447", "--identity");
         let taken = TcpListener::bind("127.0.0.1:0").expect("a free port");
         let port = taken.local_addr().expect("an address").port();
         check(&format!("tcp/127.0.0.1:{port}"), "choose another port");

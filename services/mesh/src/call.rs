@@ -70,7 +70,8 @@ impl Mesh {
                 return Err(if late == Some(true) {
                     Refusal::TimedOut { what: service.to_owned(), seconds: deadline.as_secs_f64() }
                 } else {
-                    let hint = format!("nobody answers at {key}; is `axle run {service}` up?");
+                    let denied = self.unless_denied();
+                    let hint = format!("nobody answers at {key}; is `axle run {service}` up?{denied}");
                     Refusal::unavailable(service, hint)
                 });
             }
@@ -94,6 +95,25 @@ impl Mesh {
             Answer::Given(answer) => Ok(answer),
             Answer::None | Answer::Late => {
                 Err(Refusal::unavailable(call.service(), "nobody answers at this key"))
+            }
+        }
+    }
+
+    /// Asks one process at a key of its own, once.
+    ///
+    /// # Errors
+    /// As [`Mesh::ask`].
+    pub async fn ask_at<Q: Message, A: Message>(
+        &self,
+        key: &Key<Q>,
+        question: &Q,
+        deadline: Duration,
+    ) -> Result<A, Refusal> {
+        match self.ask_once::<Q, A>(key, &encode(question)?, deadline).await? {
+            Answer::Given(answer) => Ok(answer),
+            Answer::None => Err(Refusal::unavailable("the process", format!("nobody answers at {key}"))),
+            Answer::Late => {
+                Err(Refusal::TimedOut { what: "the process".into(), seconds: deadline.as_secs_f64() })
             }
         }
     }
@@ -142,6 +162,7 @@ impl Mesh {
         let server: Server<Q, A> = self.server(key)?;
         loop {
             let asked = server.next().await;
+            let _span = tracing::info_span!("query", key = asked.key()).entered();
             match asked.question() {
                 Ok(question) => {
                     let cause = asked.cause();
@@ -224,6 +245,17 @@ impl<Q: Message, A: Message> Asked<Q, A> {
             return Err(Refusal::TooLarge { what, got: payload.len() as u64, limit: Q::LIMIT as u64 });
         }
         decode_as(&encoding, &payload.to_bytes())
+    }
+    /// The key that was asked, with the robot's name.
+    #[must_use]
+    pub fn key(&self) -> &str {
+        self.query.key_expr().as_str()
+    }
+    /// The robot that the question is about, where its key names one.
+    #[must_use]
+    pub fn robot(&self) -> Option<RobotId> {
+        let place = axle_schema::key::place(self.query.key_expr().as_str())?;
+        RobotId::new(place.robot).ok()
     }
     /// The sample that caused the question, if the asker says so.
     #[must_use]

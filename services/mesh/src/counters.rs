@@ -1,9 +1,10 @@
 //! What a process counts of itself, for its status.
 
-use axle_schema::Seconds;
+use axle_schema::presence::Flow;
+use axle_schema::{Refusal, Seconds};
 use hdrhistogram::Histogram;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// A beat that comes this much after its time counts as late.
@@ -23,6 +24,37 @@ pub struct Counters {
     lateness_us: Mutex<Histogram<u64>>,
     says: Mutex<Vec<String>>,
     hears: Mutex<Vec<String>>,
+    said: Mutex<Vec<Arc<Count>>>,
+    heard: Mutex<Vec<Arc<Count>>>,
+}
+
+/// The samples of one key.
+#[derive(Debug)]
+pub(crate) struct Count {
+    key: String,
+    samples: AtomicU64,
+    refused: AtomicU64,
+    why: Mutex<Option<String>>,
+}
+
+impl Count {
+    pub(crate) fn one(&self) {
+        self.samples.fetch_add(1, Relaxed);
+    }
+    pub(crate) fn refused(&self, refusal: &Refusal) {
+        self.refused.fetch_add(1, Relaxed);
+        // A stranger's words are cut before they are kept.
+        let why = refusal.to_string().chars().take(160).collect();
+        *self.why.lock().unwrap_or_else(PoisonError::into_inner) = Some(why);
+    }
+    fn flow(&self) -> Flow {
+        Flow {
+            key: self.key.clone(),
+            count: self.samples.load(Relaxed),
+            refused: self.refused.load(Relaxed),
+            why: self.why.lock().unwrap_or_else(PoisonError::into_inner).clone(),
+        }
+    }
 }
 
 impl Counters {
@@ -39,6 +71,8 @@ impl Counters {
             lateness_us: Mutex::new(lateness),
             says: Mutex::new(Vec::new()),
             hears: Mutex::new(Vec::new()),
+            said: Mutex::new(Vec::new()),
+            heard: Mutex::new(Vec::new()),
         }
     }
 
@@ -78,6 +112,20 @@ impl Counters {
     pub(crate) fn note_hears(&self, key: &str) {
         note(&self.hears, key);
     }
+    /// Where the samples that are published on a key are counted.
+    pub(crate) fn count_said(&self, key: &str) -> Arc<Count> {
+        count(&self.said, key)
+    }
+    /// Where the samples that arrive on a key are counted.
+    pub(crate) fn count_heard(&self, key: &str) -> Arc<Count> {
+        count(&self.heard, key)
+    }
+    pub(crate) fn said(&self) -> Vec<Flow> {
+        self.said.lock().unwrap_or_else(PoisonError::into_inner).iter().map(|count| count.flow()).collect()
+    }
+    pub(crate) fn heard(&self) -> Vec<Flow> {
+        self.heard.lock().unwrap_or_else(PoisonError::into_inner).iter().map(|count| count.flow()).collect()
+    }
     pub(crate) fn says(&self) -> Vec<String> {
         self.says.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -86,8 +134,30 @@ impl Counters {
     }
 }
 
+/// The count of a key; those beyond the bound of the status are counted for nobody.
+fn count(list: &Mutex<Vec<Arc<Count>>>, key: &str) -> Arc<Count> {
+    let mut list = list.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = list.iter().find(|count| count.key == key) {
+        return Arc::clone(known);
+    }
+    let new = Arc::new(Count {
+        key: key.to_owned(),
+        samples: AtomicU64::new(0),
+        refused: AtomicU64::new(0),
+        why: Mutex::new(None),
+    });
+    if list.len() < axle_schema::presence::MAX_KEYS {
+        list.push(Arc::clone(&new));
+    }
+    new
+}
+
 fn note(list: &Mutex<Vec<String>>, key: &str) {
     let mut list = list.lock().unwrap_or_else(PoisonError::into_inner);
+    // What is about the process itself is no wire between services.
+    if key.contains("/@") || key.ends_with("/log") {
+        return;
+    }
     if list.len() < axle_schema::presence::MAX_KEYS && !list.iter().any(|known| known == key) {
         list.push(key.to_owned());
     }

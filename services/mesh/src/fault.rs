@@ -1,12 +1,35 @@
 //! What can go wrong between a process and the mesh.
 
+use crate::Reach;
+
 /// An operation on Zenoh that failed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
     /// An endpoint that nobody can connect to.
-    #[error("{0:?} is not an endpoint; write tcp/HOST:PORT, for example tcp/127.0.0.1:7447")]
+    #[error(
+        "{0:?} is not an endpoint; write tcp/HOST:PORT, for example tcp/127.0.0.1:7447, or tls/HOST:PORT"
+    )]
     Endpoint(String),
+    /// TLS without a certificate to show.
+    #[error(
+        "{endpoint} is encrypted, and its router wants to know who you are: name an identity with --identity DIR"
+    )]
+    NoIdentity {
+        /// The endpoint.
+        endpoint: String,
+    },
+    /// Plain text with a certificate that would not be shown.
+    #[error("{endpoint} is not encrypted, and {name} has an identity: write tls/HOST:PORT")]
+    NotSecure {
+        /// The endpoint.
+        endpoint: String,
+        /// Whose identity it is.
+        name: String,
+    },
+    /// Somebody is there, but the two do not come together.
+    #[error("{0}")]
+    NotJoined(Box<Reach>),
     /// A configuration value that Zenoh refuses.
     #[error("configure Zenoh: {key}")]
     Config {

@@ -4,7 +4,8 @@
 //! a stall longer than the lease ends the session. So the callback only stores, in a queue that forgets the oldest
 //! when it is full; decoding happens in the beat of the service.
 
-use crate::{Counters, Fault, Mesh};
+use crate::counters::Count;
+use crate::{Alarm, Counters, Fault, Mesh};
 use axle_schema::Refusal;
 use axle_schema::codec::{Message, decode, decode_as};
 use axle_schema::key::Key;
@@ -12,7 +13,7 @@ use axle_schema::meta::Meta;
 use std::collections::VecDeque;
 use std::marker::PhantomData;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::sync::Notify;
 use zenoh::Wait as _;
@@ -62,6 +63,7 @@ struct Cell {
     queue: Mutex<Queue>,
     capacity: usize,
     arrived: Notify,
+    alarm: OnceLock<Alarm>,
     dropped: AtomicU64,
 }
 
@@ -91,6 +93,7 @@ impl Cell {
             queue: Mutex::default(),
             capacity,
             arrived: Notify::new(),
+            alarm: OnceLock::new(),
             dropped: AtomicU64::new(0),
         })
     }
@@ -107,6 +110,12 @@ impl Cell {
         queue.samples.push_back(Arrived { sample, at: crate::clock::wall_nanoseconds() });
         drop(queue);
         self.arrived.notify_one();
+        self.ring();
+    }
+    fn ring(&self) {
+        if let Some(alarm) = self.alarm.get() {
+            alarm.ring();
+        }
     }
     fn oldest(&self) -> Option<Arrived> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner).pop()
@@ -142,6 +151,7 @@ pub struct Inbox<M> {
     cell: Arc<Cell>,
     oversized: Arc<AtomicU64>,
     counters: Arc<Counters>,
+    count: Arc<Count>,
     complaints: Complaints,
     // Dropping the subscriber undeclares it.
     _subscriber: zenoh::pubsub::Subscriber<()>,
@@ -150,6 +160,7 @@ pub struct Inbox<M> {
 
 /// Raw samples of a key expression, waiting to be taken: for taps and recorders.
 pub struct Tap {
+    expression: zenoh::key_expr::KeyExpr<'static>,
     cell: Arc<Cell>,
     counters: Arc<Counters>,
     _subscriber: zenoh::pubsub::Subscriber<()>,
@@ -166,14 +177,18 @@ impl Mesh {
         let (store, counters) = (Arc::clone(&cell), Arc::clone(&self.counters));
         let oversized = Arc::new(AtomicU64::new(0));
         let count_oversized = Arc::clone(&oversized);
+        let count = self.counters.count_heard(&heard_from);
+        let arrived = Arc::clone(&count);
         let subscriber = self
             .session
             .declare_subscriber(heard_from.clone())
             .callback(move |sample| {
+                arrived.one();
                 // An oversized payload is not even stored: it costs no memory and no decoding.
                 if sample.payload().len() > M::LIMIT {
                     counters.refused.fetch_add(1, Relaxed);
                     count_oversized.fetch_add(1, Relaxed);
+                    store.ring();
                 } else {
                     store.store(sample);
                 }
@@ -185,6 +200,7 @@ impl Mesh {
             cell,
             oversized,
             counters: Arc::clone(&self.counters),
+            count,
             complaints: Complaints::new(key.to_string()),
             _subscriber: subscriber,
             carries: PhantomData,
@@ -203,15 +219,19 @@ impl Mesh {
         let key = expression.to_string();
         let subscriber = self
             .session
-            .declare_subscriber(expression)
+            .declare_subscriber(expression.clone())
             .callback(move |sample| store.store(sample))
             .wait()
             .map_err(|source| Fault::Declare { key, source })?;
-        Ok(Tap { cell, counters: Arc::clone(&self.counters), _subscriber: subscriber })
+        Ok(Tap { expression, cell, counters: Arc::clone(&self.counters), _subscriber: subscriber })
     }
 }
 
 impl<M: Message> Inbox<M> {
+    /// From now on rings this alarm for every sample that comes, unless it rings one already.
+    pub fn rings(&self, alarm: Alarm) {
+        drop(self.cell.alarm.set(alarm));
+    }
     /// The newest message that waits, if any; older ones are forgotten.
     pub fn latest(&self) -> Option<Heard<M>> {
         self.read(&self.cell.newest()?)
@@ -259,6 +279,7 @@ impl<M: Message> Inbox<M> {
             }
             Err(refusal) => {
                 self.counters.refused.fetch_add(1, Relaxed);
+                self.count.refused(&refusal);
                 self.complaints.say(&refusal);
                 None
             }
@@ -267,6 +288,11 @@ impl<M: Message> Inbox<M> {
 }
 
 impl Tap {
+    /// Whether it hears this key.
+    #[must_use]
+    pub fn hears(&self, key: &str) -> bool {
+        zenoh::key_expr::KeyExpr::new(key).is_ok_and(|key| self.expression.intersects(&key))
+    }
     /// The oldest sample, as soon as there is one.
     pub async fn next(&self) -> Raw {
         let sample = self.cell.next().await;

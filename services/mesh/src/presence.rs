@@ -1,9 +1,10 @@
 //! Being seen: a liveliness token and a status for each process, and who is there.
 
 use crate::{Fault, Mesh};
+use axle_schema::Seconds;
 use axle_schema::codec::{decode_as, encode, schema_of};
 use axle_schema::key::Presence;
-use axle_schema::presence::Status;
+use axle_schema::presence::{Shown, Status};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -82,12 +83,20 @@ impl Mesh {
             refused: counters.refused.load(Relaxed),
             says: counters.says(),
             hears: counters.hears(),
+            said: counters.said(),
+            heard: counters.heard(),
+            wall: Some(Seconds(crate::clock::wall())),
+            certificate: self.identity().map(|identity| Shown {
+                name: identity.name().to_owned(),
+                expires: Seconds(identity.certificate.expires),
+            }),
         }
     }
 
     /// Every process that is alive, and the status of those that answered in time; in the order of their keys.
     ///
-    /// A process with a token but without a status is frozen, or was until a moment ago.
+    /// A process with a token but without a status is frozen, or was until a moment ago. One that answers is alive, whether
+    /// its token was seen or not: an answer of the router may lack some while it is busy.
     ///
     /// # Errors
     /// [`Fault::Ask`].
@@ -147,11 +156,12 @@ impl Mesh {
         while let Some(reply) = statuses.recv().await {
             let Ok(sample) = reply.result() else { continue };
             let read = decode_as::<Status>(&sample.encoding().to_string(), &sample.payload().to_bytes());
+            // Whoever answers is alive, also where its token is missing in the answer of the router. It speaks for itself only.
             if let Ok(status) = read {
-                for (presence, place) in known.values_mut() {
-                    if presence.boot == status.boot && presence.service == status.service {
-                        *place = Some(status.clone());
-                    }
+                let Status { robot, service, host, pid, boot, .. } = status.clone();
+                let presence = Presence { robot, service, host, pid, boot };
+                if sample.key_expr().as_str() == presence.status() {
+                    known.entry(presence.alive()).or_insert((presence, None)).1 = Some(status);
                 }
             }
         }

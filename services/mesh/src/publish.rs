@@ -1,5 +1,6 @@
 //! Saying something on a key.
 
+use crate::counters::Count;
 use crate::{Fault, Mesh, clock};
 use axle_schema::codec::{Message, encode, encoding_of, schema_of};
 use axle_schema::key::{Key, Urgency};
@@ -19,6 +20,7 @@ pub struct Publisher<M> {
     source: Boot,
     seq: AtomicU64,
     counters: Arc<crate::Counters>,
+    count: Arc<Count>,
     carries: PhantomData<fn(M)>,
 }
 
@@ -54,6 +56,7 @@ impl Mesh {
             source: self.boot(),
             seq: AtomicU64::new(0),
             counters: Arc::clone(&self.counters),
+            count: self.counters.count_said(key.as_str()),
             carries: PhantomData,
         })
     }
@@ -78,6 +81,36 @@ impl Mesh {
     }
 }
 
+impl Mesh {
+    /// Publishes bytes as they are: for playing a recording.
+    ///
+    /// # Errors
+    /// A [`Refusal`] when the key is none or the bytes cannot be sent.
+    pub fn put_bytes(
+        &self,
+        key: &str,
+        encoding: &str,
+        payload: &[u8],
+        attachment: Option<&[u8]>,
+    ) -> Result<(), Refusal> {
+        let key = zenoh::key_expr::KeyExpr::new(key.to_owned())
+            .map_err(|fault| Refusal::malformed("key", fault))?;
+        let put = self
+            .session
+            .put(key, payload)
+            .encoding(Encoding::from(encoding))
+            .priority(Priority::Data)
+            .congestion_control(CongestionControl::Drop);
+        let put = match attachment {
+            Some(bytes) => put.attachment(bytes),
+            None => put,
+        };
+        put.wait().map_err(Refusal::internal)?;
+        self.counters.sent.fetch_add(1, Relaxed);
+        Ok(())
+    }
+}
+
 impl<M: Message> Publisher<M> {
     /// Publishes, naming the sample that caused this one; the answer names this one.
     ///
@@ -89,6 +122,7 @@ impl<M: Message> Publisher<M> {
         let meta = Meta { seq, source: self.source, stamp: clock::wall(), cause };
         self.publisher.put(payload).attachment(encode(&meta)?).wait().map_err(Refusal::internal)?;
         self.counters.sent.fetch_add(1, Relaxed);
+        self.count.one();
         Ok(Cause { source: self.source, seq })
     }
 }

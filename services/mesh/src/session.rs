@@ -2,7 +2,7 @@
 
 use crate::clock::Clock;
 use crate::counters::Counters;
-use crate::{Fault, config};
+use crate::{Fault, Link, Reach, config, probe};
 use axle_schema::Boot;
 use axle_schema::key::Presence;
 use std::sync::Arc;
@@ -22,6 +22,8 @@ pub struct Settings {
     pub robot: String,
     /// Streams that it hears from elsewhere: the last two chunks of the usual key, and those of the other one.
     pub inputs: Vec<(String, String)>,
+    /// How it holds its link.
+    pub link: Link,
 }
 
 /// How long to wait for a router.
@@ -41,33 +43,43 @@ pub struct Mesh {
     pub(crate) counters: Arc<Counters>,
     pub(crate) version: &'static str,
     inputs: Arc<[(String, String)]>,
+    identity: Option<Arc<crate::Identity>>,
     clock: Clock,
 }
 
 impl Mesh {
-    /// Joins the mesh. While the router is absent, `waiting` is called once a second with the time waited so far.
+    /// Joins the mesh. While the router is absent, `waiting` is called once a second with the time waited so far, and
+    /// with what is wrong if somebody is there all the same.
     ///
     /// # Errors
-    /// [`Fault::Endpoint`] for an endpoint of a wrong form, [`Fault::NoRouter`] when patience ran out.
+    /// [`Fault::Endpoint`] for an endpoint of a wrong form, [`Fault::NoRouter`] and [`Fault::NotJoined`] when patience
+    /// ran out.
     pub async fn join(
         settings: Settings,
         patience: Patience,
-        mut waiting: impl FnMut(Duration),
+        mut waiting: impl FnMut(Duration, Option<Reach>),
     ) -> Result<Self, Fault> {
         let timeout_ms = match patience {
             Patience::Forever => -1,
             Patience::AtMost(time) => i64::try_from(time.as_millis()).unwrap_or(i64::MAX),
         };
-        let config = config::client(&settings.connect, timeout_ms)?;
-        let no_router = || Fault::NoRouter { endpoints: settings.connect.join(", ") };
+        let config = config::client(&settings.connect, timeout_ms, &settings.link)?;
         // Opening blocks its thread until the router answers: it gets a thread that may block.
         let mut opening = tokio::task::spawn_blocking(move || zenoh::open(config).wait());
         let started = Clock::start();
         let session = loop {
             match tokio::time::timeout(Duration::from_secs(1), &mut opening).await {
                 Ok(Ok(Ok(session))) => break session,
-                Ok(_) => return Err(no_router()),
-                Err(_) => waiting(started.elapsed()),
+                Ok(_) => {
+                    let endpoints = settings.connect.join(", ");
+                    let obstacle = obstacle(&settings).await;
+                    return Err(obstacle
+                        .map_or(Fault::NoRouter { endpoints }, |reach| Fault::NotJoined(Box::new(reach))));
+                }
+                Err(_) => {
+                    let waited = started.elapsed();
+                    waiting(waited, obstacle(&settings).await);
+                }
             }
         };
         let inputs = settings.inputs.into();
@@ -83,6 +95,7 @@ impl Mesh {
             presence: Arc::new(presence),
             counters: Arc::new(Counters::new()),
             inputs,
+            identity: settings.link.identity.map(Arc::new),
             version: env!("CARGO_PKG_VERSION"),
             clock: Clock::start(),
         })
@@ -93,11 +106,28 @@ impl Mesh {
     pub fn boot(&self) -> Boot {
         self.presence.boot
     }
+    /// Who this process is on the mesh.
+    #[must_use]
+    pub fn presence(&self) -> &Presence {
+        &self.presence
+    }
     /// `service@host/pid`: how the process is called in messages for people.
     #[must_use]
     pub fn name(&self) -> String {
         let Presence { service, host, pid, .. } = &*self.presence;
         format!("{service}@{host}/{pid}")
+    }
+    /// Who the process is to the access rules of its router.
+    #[must_use]
+    pub fn identity(&self) -> Option<&crate::Identity> {
+        self.identity.as_deref()
+    }
+    /// What to add where nothing came back: a router says nothing of what its access rules drop.
+    #[must_use]
+    pub fn unless_denied(&self) -> String {
+        let Some(identity) = self.identity() else { return String::new() };
+        let role = &identity.certificate.role;
+        format!("; or the access rules of the router do not let {} ({role}) do this", identity.name())
     }
     /// Time since the process joined.
     #[must_use]
@@ -136,6 +166,15 @@ impl Mesh {
             tracing::warn!("the session did not close within 1 s and is dropped");
         }
     }
+}
+
+/// What is wrong at the first endpoint where somebody listens; a router that only hangs is nothing to explain.
+async fn obstacle(settings: &Settings) -> Option<Reach> {
+    let Settings { connect, link, .. } = settings.clone();
+    let look =
+        move || connect.iter().map(|endpoint| probe(endpoint, link.identity.as_ref())).collect::<Vec<_>>();
+    let found = tokio::task::spawn_blocking(look).await.ok()?;
+    found.into_iter().find(|reach| !matches!(reach, Reach::Nobody { .. } | Reach::Open { .. }))
 }
 
 /// 64 bits that nobody can guess, from the standard library's own source of randomness.
