@@ -3,10 +3,18 @@
 //! Ratios are taken side by side in one run: one round of Axle, one round of bare Zenoh, and so on, through the same
 //! router and between the same processes. Single times on a shared machine say little; their ratios hold.
 
+pub(crate) mod board;
 mod cases;
+pub(crate) mod faults;
+pub(crate) mod fleet;
 pub(crate) mod motion;
+pub(crate) mod navigator;
 mod process;
+mod proxy;
+pub(crate) mod record;
 pub(crate) mod stop;
+pub(crate) mod taps;
+pub(crate) mod tournament;
 
 use crate::command::up::all_alive;
 use crate::out::{data, note, table};
@@ -34,7 +42,7 @@ const REST: Duration = Duration::from_secs(3);
 /// Measures.
 pub(crate) async fn mesh(settings: &Settings, json: bool, rounds: u32) -> anyhow::Result<()> {
     let mut stop = signal::stop()?;
-    let bed = Bed::start(settings, &mut stop).await?;
+    let bed = Bed::start(settings, &mut stop, None).await?;
     let measured = tokio::select! {
         measured = bed.measure(settings, rounds) => measured,
         () = stop.wait() => Err(anyhow::anyhow!("ended before everything was measured")),
@@ -46,7 +54,7 @@ pub(crate) async fn mesh(settings: &Settings, json: bool, rounds: u32) -> anyhow
 /// The other end: answers bare queries, and sends back what it hears, bare and typed.
 pub(crate) async fn peer(settings: &Settings) -> anyhow::Result<()> {
     let robot = settings.one_robot()?;
-    let mesh = join(settings.mesh("bench-peer", Some(&robot)), Patience::Forever).await?;
+    let mesh = join(settings.mesh("bench-peer", Some(&robot))?, Patience::Forever).await?;
     let bare = mesh.bare();
     let typed = async {
         let (there, back) = key::BENCH;
@@ -72,8 +80,21 @@ pub(crate) async fn peer(settings: &Settings) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// What this share of the sorted values does not exceed; of no values it is no number.
+pub(crate) fn quantile(sorted: &[f64], share: f64) -> f64 {
+    let last = sorted.len().saturating_sub(1);
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        reason = "an index"
+    )]
+    let index = (last as f64 * share).ceil() as usize;
+    sorted.get(index).copied().unwrap_or(f64::NAN)
+}
+
 /// An endpoint of this computer that nobody listens on.
-fn free_endpoint() -> anyhow::Result<String> {
+pub(crate) fn free_endpoint() -> anyhow::Result<String> {
     let free = TcpListener::bind("127.0.0.1:0").and_then(|free| free.local_addr());
     Ok(format!("tcp/{}", free.context("find a free port")?))
 }
@@ -89,8 +110,8 @@ struct Bed {
 }
 
 impl Bed {
-    /// Starts the shipped topology on a free port, and the other end of the bench.
-    async fn start(settings: &Settings, stop: &mut Stop) -> anyhow::Result<Self> {
+    /// Starts the shipped topology on a free port, with that method of the navigator, and the other end of the bench.
+    async fn start(settings: &Settings, stop: &mut Stop, method: Option<&str>) -> anyhow::Result<Self> {
         let scratch = std::env::temp_dir().join(format!("axle-bench-{}", std::process::id()));
         std::fs::create_dir_all(&scratch)?;
         let endpoint = free_endpoint()?;
@@ -98,12 +119,15 @@ impl Bed {
         for service in topology.services.iter_mut().filter(|service| service.kind == "recorder") {
             service.params.insert("file".into(), scratch.join("bench.mcap").display().to_string().into());
         }
+        for service in topology.services.iter_mut().filter(|service| service.kind == "navigator") {
+            service.params.extend(method.map(|method| ("method".to_owned(), method.into())));
+        }
         // Not the robot of the mesh: its recorder would hear every typed hop and no bare one.
         let robot = RobotId::new("bench")?;
         let (host, _) = topology.host(None)?;
         let log = Log::File(Arc::new(Mutex::new(std::fs::File::create(scratch.join("bench.log"))?)));
         let started = Instant::now();
-        let supervisor = Supervisor::start(&topology, host, &endpoint, &settings.log, None, &log)?;
+        let supervisor = Supervisor::start(&topology, host, &endpoint, None, &settings.log, None, &log)?;
         let alive = tokio::select! {
             alive = all_alive(settings, &endpoint, &supervisor) => alive,
             () = stop.wait() => Err(anyhow::anyhow!("ended before the mesh was up")),
@@ -139,7 +163,7 @@ impl Bed {
         let after = usage();
         let cpu_cores = after.cpu.saturating_sub(before.cpu).as_secs_f64() / began.elapsed().as_secs_f64();
 
-        let mut own = settings.mesh("bench", Some(&self.robot));
+        let mut own = settings.mesh("bench", Some(&self.robot))?;
         own.connect = vec![self.endpoint.clone()];
         let mesh = join(own, Patience::AtMost(Duration::from_secs(5))).await?;
         note(&format!("{rounds} queries of each …"));
@@ -154,7 +178,11 @@ impl Bed {
 
 /// Pathfinder asked for the square, against a bare query of the same sizes.
 async fn queries(mesh: &Mesh, robot: &RobotId, rounds: u32) -> anyhow::Result<Pair> {
-    let ask = PlanAsk { way: WayTask::parse("0,0 1,0 1,1 0,1 0,0")?, start: Some(Pose::default()) };
+    let ask = PlanAsk {
+        way: WayTask::parse("0,0 1,0 1,1 0,1 0,0")?,
+        start: Some(Pose::default()),
+        ..PlanAsk::default()
+    };
     let ask_once = || mesh.ask(&key::PLAN, Some(robot), &ask, LOST, Retry::Idempotent);
     let sizes = (encode(&ask)?.len(), encode(&ask_once().await?)?.len());
     let bare = mesh.bare();
@@ -231,19 +259,12 @@ impl Pair {
     }
     /// Microseconds that a share of the rounds did not exceed: of Axle, of bare Zenoh, and their ratio.
     fn at(&self, share: f64) -> (f64, f64, f64) {
-        let quantile = |times: &[Duration]| {
-            let mut times = times.to_vec();
-            times.sort_unstable();
-            #[allow(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                clippy::cast_precision_loss,
-                reason = "an index"
-            )]
-            let index = ((times.len().saturating_sub(1)) as f64 * share).round() as usize;
-            times.get(index).map_or(0.0, |time| time.as_secs_f64() * 1e6)
+        let at = |times: &[Duration]| {
+            let mut times: Vec<f64> = times.iter().map(|time| time.as_secs_f64() * 1e6).collect();
+            times.sort_by(f64::total_cmp);
+            quantile(&times, share)
         };
-        let (axle, bare) = (quantile(&self.axle), quantile(&self.bare));
+        let (axle, bare) = (at(&self.axle), at(&self.bare));
         (axle, bare, axle / bare)
     }
     fn to_json(&self) -> serde_json::Value {

@@ -4,14 +4,17 @@
 
 mod wires;
 
-pub(crate) use wires::{Wires, is_shared};
+pub(crate) use wires::{Wires, composed_of, emulated_board, is_shared};
 
 use crate::params;
+use crate::replay::{self, Replay};
 use crate::run::{self, Context, Running};
 use axle_correctors::{ArcCorrector, DCorrector, GCorrector, LtvCorrector, PursuitCorrector, WCorrector};
 use axle_pathdriver::Pathdriver;
 use axle_pathfinder::Pathfinder;
+use axle_schema::Message;
 use axle_schema::contract::Params as _;
+use axle_schema::trace::Answered;
 use std::path::Path;
 
 /// For whom a service works when no robot is named.
@@ -50,6 +53,8 @@ pub(crate) struct Entry {
     pub(crate) check: fn(Option<&Path>) -> anyhow::Result<()>,
     /// Runs it until it is told to stop.
     pub(crate) run: fn(Context) -> Running,
+    /// Replays it from a recording, if it is a value that can be.
+    pub(crate) replay: Option<Replay>,
 }
 
 impl Entry {
@@ -57,7 +62,10 @@ impl Entry {
         name: &'static str,
         about: &'static str,
         wires: fn(&'static str) -> Wires,
-    ) -> Self {
+    ) -> Self
+    where
+        Answered<F::Ask, F::Answer>: Message,
+    {
         Self {
             name,
             about,
@@ -67,6 +75,7 @@ impl Entry {
             params: <F::Params as axle_schema::contract::Params>::FILE,
             check: params::check::<F::Params>,
             run: |context| Box::pin(run::functional::run::<F>(context)),
+            replay: Some(replay::functional::<F>),
         }
     }
     const fn corrector<C: run::corrector::Driven>(
@@ -83,6 +92,7 @@ impl Entry {
             params: <C::Params as axle_schema::contract::Params>::FILE,
             check: params::check::<C::Params>,
             run: |context| Box::pin(run::corrector::run::<C>(context)),
+            replay: Some(replay::corrector::<C>),
         }
     }
 }
@@ -98,13 +108,46 @@ pub(crate) const CATALOG: &[Entry] = &[
         params: axle_pilot::PilotParams::FILE,
         check: run::pilot::check,
         run: |context| Box::pin(run::pilot::run(context)),
+        replay: None,
     },
-    Entry::functional::<Pathfinder>("pathfinder", "Turns way points into geometries.", wires::pathfinder),
+    Entry {
+        name: "pathfinder",
+        about: "Turns way points into geometries.",
+        scope: Scope::AllRobots,
+        takes: None,
+        wires: wires::pathfinder,
+        params: axle_pathfinder::PathfinderParams::FILE,
+        check: params::check::<axle_pathfinder::PathfinderParams>,
+        run: |context| Box::pin(run::pathfinder::run(context)),
+        replay: Some(replay::functional::<Pathfinder>),
+    },
+    Entry {
+        name: "map",
+        about: "Says the map that robots share.",
+        scope: Scope::AllRobots,
+        takes: None,
+        wires: wires::map,
+        params: axle_maps::MapParams::FILE,
+        check: run::map::check,
+        run: |context| Box::pin(run::map::run(context)),
+        replay: None,
+    },
     Entry::functional::<Pathdriver>(
         "pathdriver",
         "Turns geometries into movements within the robot's limits.",
         wires::pathdriver,
     ),
+    Entry {
+        name: "traffic",
+        about: "Keeps the robots of a fleet from meeting and from waiting for ever.",
+        scope: Scope::AllRobots,
+        takes: None,
+        wires: wires::traffic,
+        params: axle_traffic::TrafficParams::FILE,
+        check: params::check::<axle_traffic::TrafficParams>,
+        run: |context| Box::pin(run::traffic::run(context)),
+        replay: None,
+    },
     Entry::corrector::<DCorrector>(
         "d-corrector",
         Takes::Drive,
@@ -144,6 +187,7 @@ pub(crate) const CATALOG: &[Entry] = &[
         params: axle_drive::DriveParams::FILE,
         check: params::check::<axle_drive::DriveParams>,
         run: |context| Box::pin(run::drive::run(context)),
+        replay: None,
     },
     Entry {
         name: "emulator",
@@ -154,6 +198,29 @@ pub(crate) const CATALOG: &[Entry] = &[
         params: axle_emulator::EmulatorParams::FILE,
         check: params::check::<axle_emulator::EmulatorParams>,
         run: |context| Box::pin(run::emulator::run(context)),
+        replay: None,
+    },
+    Entry {
+        name: "robot",
+        about: "A robot with a real board on a serial line, behind its gate.",
+        scope: Scope::OneRobot,
+        takes: None,
+        wires: wires::robot,
+        params: axle_robot::RobotParams::FILE,
+        check: params::check::<axle_robot::RobotParams>,
+        run: |context| Box::pin(run::robot::run(context)),
+        replay: None,
+    },
+    Entry {
+        name: "calibrator",
+        about: "Turns speeds into signals for the motors, and signals into speeds.",
+        scope: Scope::OneRobot,
+        takes: None,
+        wires: wires::calibrator,
+        params: axle_calibrator::CalibratorParams::FILE,
+        check: params::check::<axle_calibrator::CalibratorParams>,
+        run: |context| Box::pin(run::calibrator::run(context)),
+        replay: None,
     },
     Entry {
         name: "composed",
@@ -164,26 +231,51 @@ pub(crate) const CATALOG: &[Entry] = &[
         params: run::composed::ComposedParams::FILE,
         check: params::check::<run::composed::ComposedParams>,
         run: |context| Box::pin(run::composed::run(context)),
+        replay: None,
     },
     Entry {
         name: "motor-left",
-        about: "The left motor of a composed robot, in software, with its encoder.",
+        about: "The left motor of a composed robot, in software, with an encoder or without.",
         scope: Scope::OneRobot,
         takes: None,
         wires: wires::motor,
         params: axle_emulator::MotorParams::FILE,
         check: params::check::<axle_emulator::MotorParams>,
         run: |context| Box::pin(run::motor::run(context, 0)),
+        replay: None,
     },
     Entry {
         name: "motor-right",
-        about: "The right motor of a composed robot, in software, with its encoder.",
+        about: "The right motor of a composed robot, in software, with an encoder or without.",
         scope: Scope::OneRobot,
         takes: None,
         wires: wires::motor,
         params: axle_emulator::RIGHT_MOTOR,
         check: params::check::<axle_emulator::MotorParams>,
         run: |context| Box::pin(run::motor::run(context, 1)),
+        replay: None,
+    },
+    Entry {
+        name: "encoder-left",
+        about: "The encoder of the left wheel of a composed robot, in software, where the motor has none.",
+        scope: Scope::OneRobot,
+        takes: None,
+        wires: wires::encoder,
+        params: axle_emulator::EncoderParams::FILE,
+        check: params::check::<axle_emulator::EncoderParams>,
+        run: |context| Box::pin(run::motor::encode(context, 0)),
+        replay: None,
+    },
+    Entry {
+        name: "encoder-right",
+        about: "The encoder of the right wheel of a composed robot, in software, where the motor has none.",
+        scope: Scope::OneRobot,
+        takes: None,
+        wires: wires::encoder,
+        params: axle_emulator::RIGHT_ENCODER,
+        check: params::check::<axle_emulator::EncoderParams>,
+        run: |context| Box::pin(run::motor::encode(context, 1)),
+        replay: None,
     },
     Entry {
         name: "source",
@@ -194,6 +286,7 @@ pub(crate) const CATALOG: &[Entry] = &[
         params: axle_source::SourceParams::FILE,
         check: params::check::<axle_source::SourceParams>,
         run: |context| Box::pin(run::source::run(context)),
+        replay: Some(replay::source),
     },
     Entry {
         name: "navigator",
@@ -204,6 +297,7 @@ pub(crate) const CATALOG: &[Entry] = &[
         params: axle_navigator::NavigatorParams::FILE,
         check: params::check::<axle_navigator::NavigatorParams>,
         run: |context| Box::pin(run::navigator::run(context)),
+        replay: Some(replay::navigator),
     },
     Entry {
         name: "recorder",
@@ -214,12 +308,29 @@ pub(crate) const CATALOG: &[Entry] = &[
         params: axle_recorder::RecorderParams::FILE,
         check: params::check::<axle_recorder::RecorderParams>,
         run: |context| Box::pin(run::recorder::run(context)),
+        replay: None,
+    },
+    Entry {
+        name: "gateway",
+        about: "Shows robots in a browser, and lets people drive them there.",
+        scope: Scope::AllRobots,
+        takes: None,
+        wires: wires::gateway,
+        params: axle_gateway::GatewayParams::FILE,
+        check: params::check::<axle_gateway::GatewayParams>,
+        run: |context| Box::pin(run::gateway::run(context)),
+        replay: None,
     },
 ];
 
 /// The service of that name.
 pub(crate) fn find(name: &str) -> Option<&'static Entry> {
     CATALOG.iter().find(|entry| entry.name == name)
+}
+
+/// Whether a service drives or plays a board.
+pub(crate) fn takes_board(name: &str) -> bool {
+    name == "robot" || name == "emulator"
 }
 
 /// The names of all services, for messages.

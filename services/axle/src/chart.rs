@@ -8,13 +8,23 @@ mod boxes;
 mod page;
 mod panel;
 mod paths;
+mod raster;
+mod scatter;
 mod thin;
 
 pub(crate) use panel::Panel;
 pub(crate) use paths::MAX_SERIES;
+pub(crate) use raster::png;
+pub(crate) use scatter::{Scatter, scatter_chart};
 
 use anyhow::Context as _;
 use page::Page;
+
+/// What of a map is not free, by its corners in metres.
+pub(crate) type Wall = (axle_maps::Ink, [(f64, f64); 4]);
+
+/// The most of them in one chart.
+pub(crate) const MAX_WALLS: usize = 20_000;
 
 /// A path with a name: points in metres, in the order of driving.
 #[derive(Clone, Debug, Default)]
@@ -78,6 +88,9 @@ pub(crate) fn demo_chart(
     chart(title, paths, way_points, &[Panel::due_and_real(wheels)])
 }
 
+/// The smallest square that the paths of a contest are drawn in, m.
+const LEAST: f64 = 0.1;
+
 /// How values of one name are spread.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Spread {
@@ -94,7 +107,7 @@ pub(crate) fn contest_chart(
     paths: &[PathSeries],
     (axis, spreads): (&str, &[Spread]),
 ) -> anyhow::Result<String> {
-    let plane = (!paths.is_empty()).then(|| paths::Plane::new(paths, &[]));
+    let plane = (!paths.is_empty()).then(|| paths::Plane::new(paths, &[], &[]).at_least(LEAST));
     let above = plane.as_ref().map_or(0, paths::Plane::height);
     let mut page = Page::new(title, above + boxes::height(spreads.len()));
     let drawn = page.draw(|sheet| {
@@ -113,7 +126,46 @@ pub(crate) fn chart(
     way_points: &[(f64, f64)],
     panels: &[Panel],
 ) -> anyhow::Result<String> {
-    let plane = paths::Plane::new(paths, way_points);
+    floor_chart(title, paths, way_points, &[], panels)
+}
+
+/// The same, on the walls of a map.
+pub(crate) fn floor_chart(
+    title: &str,
+    paths: &[PathSeries],
+    way_points: &[(f64, f64)],
+    walls: &[Wall],
+    panels: &[Panel],
+) -> anyhow::Result<String> {
+    page(title, &paths::Plane::new(paths, way_points, walls), panels)
+}
+
+/// The paths on a map.
+pub(crate) fn map_chart(
+    title: &str,
+    paths: &[PathSeries],
+    way_points: &[(f64, f64)],
+    walls: &[Wall],
+) -> anyhow::Result<String> {
+    floor_chart(title, paths, way_points, walls, &[])
+}
+
+/// A closed line, in metres.
+pub(crate) type Outline = Vec<(f64, f64)>;
+
+/// The same with panels, and with the ellipses in which the robot believed to be.
+pub(crate) fn believed_chart(
+    title: &str,
+    paths: &[PathSeries],
+    way_points: &[(f64, f64)],
+    (walls, ellipses): (&[Wall], &[Outline]),
+    panels: &[Panel],
+) -> anyhow::Result<String> {
+    let plane = paths::Plane::new(paths, way_points, walls).with_outlines("95 % of estimate", ellipses);
+    page(title, &plane, panels)
+}
+
+fn page(title: &str, plane: &paths::Plane<'_>, panels: &[Panel]) -> anyhow::Result<String> {
     let below: u32 = panels.iter().map(|_| panel::HEIGHT).sum();
     let mut page = Page::new(title, plane.height() + below);
     let drawn = page.draw(|sheet| {

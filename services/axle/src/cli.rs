@@ -1,15 +1,30 @@
 //! The command line.
 
+mod calibrate;
 pub(crate) mod drive;
+mod keys;
 mod lines;
+mod login;
+mod map;
+mod recording;
+mod tap;
 mod tournament;
 
+pub(crate) use calibrate::Calibrate;
+pub(crate) use keys::{Install, Issue, Keys};
 pub(crate) use lines::{Chart, Convert, Estimate};
+pub(crate) use login::Login;
+pub(crate) use map::Map;
+pub(crate) use recording::{Play, Record, RecordWork, Replay, Why};
+pub(crate) use tap::{Tap, Top};
 pub(crate) use tournament::Tournament;
 
 use crate::settings::Settings;
-use axle_schema::{Pose, Refusal, WayTask};
+use axle_robot::BoardKind;
+use axle_schema::{Joints, PlanStrategy, Pose, Refusal, Strategy, WayTask};
 use clap::{Parser, Subcommand, ValueEnum};
+use serde::de::DeserializeOwned;
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
 /// Services that drive differential-wheeled robots, over Zenoh.
@@ -38,14 +53,29 @@ pub(crate) enum Command {
     Router(Router),
     /// List the live services
     Ps(Json),
-    /// Find out whether a service works, by a round trip of data through its router
+    /// Find out what is wrong between the services of a topology, or whether one service works
     Doctor(Doctor),
+    /// Issue certificates, and the access rules of routers
+    #[command(subcommand)]
+    Keys(Keys),
+    /// Say who may log in at the page from other computers
+    #[command(subcommand)]
+    Login(Login),
+    /// Write the units, parameters and certificates of one computer, for systemd
+    Install(Install),
     /// List the streams with type, rate and size
     Ls(Ls),
     /// Ask Pathfinder for the geometries of a way, and Pathdriver for the movements
     Plan(Plan),
+    /// Show, check and inflate maps
+    #[command(subcommand)]
+    Map(Map),
     /// Drive a way, and show how far the robot is
     Go(Go),
+    /// Let the robot drive on from a loading point
+    Confirm,
+    /// Show the robots of a fleet: their order, and who waits for whom
+    Traffic(Traffic),
     /// Drive by the Generic Differential Drive contract: powers, speeds, distances, degrees, the keyboard
     #[command(subcommand)]
     Drive(drive::Drive),
@@ -64,14 +94,28 @@ pub(crate) enum Command {
     Conform(Conform),
     /// Print any stream, decoded, one line a message
     Tap(Tap),
+    /// Make a service log more or less while it runs; `axle tap 'axle/*/*/log'` prints what is logged
+    Log(Log),
+    /// Watch the services, beats, rates and gates, and stop, enable or look into them, in a terminal
+    Top(Top),
+    /// Record any streams to MCAP; look at recordings, repair them, cut parts out of them
+    Record(Record),
+    /// Say again what was recorded
+    Play(Play),
+    /// Feed services what they had when a recording was made, and compare what they say, bit for bit
+    Replay(Replay),
+    /// Tell why the wheels of a robot did what they did: from the command back to the way
+    Why(Why),
     /// Convert JSON lines: movements to poses, encoder readings to spans, and every other arrow of the map
     Convert(Convert),
-    /// Draw JSON lines or a recording as SVG: the path, and what the wheels do over time
+    /// Draw JSON lines, a recording or what is said now as SVG or PNG: the path, and what the wheels do over time
     Chart(Chart),
     /// Estimate where a robot was from a log of its measurements, by any method of the navigator
     Estimate(Estimate),
     /// Compare the correctors on emulated robots in virtual time, or tune one
     Tournament(Tournament),
+    /// Measure motors, wheels and track of a robot, which drives about in its room; or watch whether they still are so
+    Calibrate(Calibrate),
     /// Print the parameters of a service with their explanations
     Params {
         /// The service
@@ -94,9 +138,33 @@ pub(crate) enum Command {
     /// The process that `axle bench stop` kills
     #[command(hide = true)]
     BenchCommander,
+    /// The process that `axle bench record` kills
+    #[command(hide = true)]
+    BenchRecorder {
+        /// The recording
+        file: PathBuf,
+    },
     /// The other end of `axle bench mesh`
     #[command(hide = true)]
     BenchPeer,
+}
+
+impl Command {
+    /// Whether it only looks at what others do, so that they may have the processor first.
+    pub(crate) const fn looks_on(&self) -> bool {
+        matches!(self, Self::Tap(_) | Self::Top(_) | Self::Chart(_))
+    }
+}
+
+/// `axle traffic`.
+#[derive(Clone, Debug, clap::Args)]
+pub(crate) struct Traffic {
+    /// Explain for whom this robot waits [default: a table of all robots]
+    #[arg(id = "of", value_name = "ROBOT")]
+    pub(crate) robot: Option<String>,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// `axle stop`.
@@ -166,7 +234,16 @@ pub(crate) struct Demo {
     /// The corrector that drives
     #[arg(long, value_name = "NAME", default_value = "d-corrector")]
     pub(crate) corrector: String,
+    /// Show the robot in a browser too, and stay until Ctrl-C
+    #[arg(long, value_name = "IP:PORT", num_args = 0..=1, require_equals = true, default_missing_value = PAGE)]
+    pub(crate) page: Option<SocketAddr>,
+    /// Emulate this board too, and drive it through a serial line: arduino, roomba, eddie, dwm-text
+    #[arg(long, value_name = "KIND", value_parser = BoardKind::parse)]
+    pub(crate) board: Option<BoardKind>,
 }
+
+/// Where the page is unless somebody says otherwise.
+const PAGE: &str = "127.0.0.1:8080";
 
 /// Arguments of `axle up`.
 #[derive(Debug, clap::Args)]
@@ -176,6 +253,12 @@ pub(crate) struct Up {
     /// Where the router listens, instead of where the topology says
     #[arg(long, env = "AXLE_LISTEN", hide_env_values = true, value_name = "tcp/HOST:PORT")]
     pub(crate) listen: Option<String>,
+    /// Show the robots in a browser too: starts a gateway, unless the topology has one
+    #[arg(long, value_name = "IP:PORT", num_args = 0..=1, require_equals = true, default_missing_value = PAGE)]
+    pub(crate) page: Option<SocketAddr>,
+    /// Encrypt everything, with the identities of this directory of `axle keys`
+    #[arg(long, env = "AXLE_KEYS", hide_env_values = true, value_name = "DIR")]
+    pub(crate) keys: Option<PathBuf>,
 }
 
 /// Arguments of `axle run`.
@@ -185,11 +268,23 @@ pub(crate) struct Run {
     #[arg(env = "AXLE_SERVICE", hide_env_values = true)]
     pub(crate) service: String,
     /// Hear a stream from elsewhere; may be given several times
-    #[arg(long, value_name = "STREAM=OTHER")]
+    #[arg(
+        long,
+        env = "AXLE_INPUT",
+        hide_env_values = true,
+        value_name = "STREAM=OTHER",
+        value_delimiter = ','
+    )]
     pub(crate) input: Vec<String>,
     /// Its parameters [default: those that `axle params SERVICE` prints]
     #[arg(long, env = "AXLE_PARAMS", hide_env_values = true, value_name = "FILE")]
     pub(crate) params: Option<PathBuf>,
+    /// The board of a robot or emulator: arduino, roomba, eddie, orfa, dwm-text
+    #[arg(long, env = "AXLE_BOARD", hide_env_values = true, value_name = "KIND", value_parser = BoardKind::parse)]
+    pub(crate) board: Option<BoardKind>,
+    /// The port of the robot's board [default: /dev/ttyUSB0]; of an emulated board, a link to make to its terminal
+    #[arg(long, env = "AXLE_PORT", hide_env_values = true, value_name = "PATH")]
+    pub(crate) port: Option<PathBuf>,
 }
 
 /// Arguments of `axle router`.
@@ -205,23 +300,35 @@ pub(crate) struct Router {
     )]
     pub(crate) listen: Vec<String>,
     /// A router of another computer to link to; may be given several times
-    #[arg(long, value_name = "tcp/HOST:PORT", value_delimiter = ',')]
+    #[arg(
+        long,
+        env = "AXLE_LINK",
+        hide_env_values = true,
+        value_name = "tcp/HOST:PORT",
+        value_delimiter = ','
+    )]
     pub(crate) link: Vec<String>,
     /// Listen beyond this computer although nothing is encrypted or authenticated
-    #[arg(long)]
+    #[arg(long, env = "AXLE_INSECURE_LAN", hide_env_values = true)]
     pub(crate) insecure_lan: bool,
+    /// With an identity, who may do what [default: access.json beside the certificate]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) access: Option<PathBuf>,
 }
 
 /// `axle doctor`.
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct Doctor {
     /// Look at one process: the service or router of this computer that is named, the healthcheck of a container
-    #[arg(long = "self", required = true)]
+    #[arg(long = "self")]
     pub(crate) own: bool,
-    /// The service, or `router`
-    #[arg(env = "AXLE_SERVICE", hide_env_values = true)]
-    pub(crate) service: String,
-    /// Print one JSON object
+    /// With --self, the service or `router`
+    #[arg(env = "AXLE_SERVICE", hide_env_values = true, required_if_eq("own", "true"))]
+    pub(crate) service: Option<String>,
+    /// Look at every pair of this topology [default: one emulated robot and its planners]
+    #[arg(long, value_name = "FILE", conflicts_with = "own")]
+    pub(crate) topology: Option<PathBuf>,
+    /// Print one JSON object, or one a finding
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -246,15 +353,45 @@ pub(crate) struct Plan {
     /// Where the robot is: x,y,heading
     #[arg(long, value_name = "x,y,heading", value_parser = pose, allow_hyphen_values = true)]
     pub(crate) from: Option<Pose>,
+    /// How the way is made: turn-and-go, rounded, arcs, smooth, dubins, map [default: Pathfinder's choice]
+    #[arg(long, value_name = "NAME", value_parser = PlanStrategy::of_name)]
+    pub(crate) strategy: Option<PlanStrategy>,
+    /// The map.yaml to plan on [default: the map service, where the strategy needs one]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) map: Option<PathBuf>,
+    /// Visit the points in an order that makes the way short
+    #[arg(long)]
+    pub(crate) order: bool,
+    /// Radius of the robot, in metres [default: Pathfinder's choice]
+    #[arg(long, value_name = "METRES")]
+    pub(crate) body: Option<f64>,
+    /// How long Pathfinder may search, in seconds [default: Pathfinder's choice]
+    #[arg(long, value_name = "SECONDS")]
+    pub(crate) deadline: Option<f64>,
+    /// Plan in this process, without a mesh
+    #[arg(long)]
+    pub(crate) here: bool,
+    /// The parameters of Pathfinder for --here [default: those that `axle params pathfinder` prints]
+    #[arg(long, value_name = "FILE", requires = "here")]
+    pub(crate) params: Option<PathBuf>,
     /// Ask Pathdriver too, and print the movements
     #[arg(long)]
     pub(crate) drive: bool,
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,
-    /// Draw the path
+    /// Draw the path, and with --drive the speeds of the wheels
     #[arg(long, value_name = "FILE")]
     pub(crate) svg: Option<PathBuf>,
+    /// How the speeds are chosen: stop or continuous [default: as Pathdriver's parameters say]
+    #[arg(long, value_name = "NAME", requires = "drive", value_parser = word::<Strategy>)]
+    pub(crate) speeds: Option<Strategy>,
+    /// How legs of different curvature meet: jump or blend [default: as Pathdriver's parameters say]
+    #[arg(long, value_name = "NAME", requires = "drive", value_parser = word::<Joints>)]
+    pub(crate) joints: Option<Joints>,
+    /// The most that a wheel speed may jump, in m/s [default: as Pathdriver's parameters say]
+    #[arg(long, value_name = "M/S", requires = "drive")]
+    pub(crate) jump: Option<f64>,
 }
 
 /// Arguments of `axle go`.
@@ -266,28 +403,21 @@ pub(crate) struct Go {
     /// The corrector that drives [default: the pilot's choice]
     #[arg(long, value_name = "NAME")]
     pub(crate) corrector: Option<String>,
+    /// The way points, counted from 1, at which the robot waits for `axle confirm`
+    #[arg(long, value_name = "N,N,…", value_delimiter = ',')]
+    pub(crate) confirm: Vec<u32>,
     /// Print JSON
     #[arg(long)]
     pub(crate) json: bool,
 }
 
-/// Arguments of `axle tap`.
+/// Arguments of `axle log`.
 #[derive(Debug, clap::Args)]
-pub(crate) struct Tap {
-    /// The keys: axle/r1/navigator/pose, axle/r1/**, axle/*/gate/state …
-    pub(crate) keys: String,
-    /// Print JSON
-    #[arg(long)]
-    pub(crate) json: bool,
-    /// End after that many messages
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
-    pub(crate) count: Option<u64>,
-    /// Print the rate of each stream, once a second
-    #[arg(long, conflicts_with = "bw")]
-    pub(crate) hz: bool,
-    /// Print the bandwidth of each stream, once a second
-    #[arg(long)]
-    pub(crate) bw: bool,
+pub(crate) struct Log {
+    /// The service
+    pub(crate) service: String,
+    /// error, warn, info, debug, trace, off, or per part (info,axle_mesh=debug)
+    pub(crate) level: String,
 }
 
 /// The benches.
@@ -295,6 +425,18 @@ pub(crate) struct Tap {
 pub(crate) enum Bench {
     /// The exact motion of a movement: time, error, and the price of Simpson's rule
     Motion {
+        /// Print one JSON object
+        #[arg(long)]
+        json: bool,
+    },
+    /// How long a step of each corrector takes, and how much faster than real time the tournament is
+    Tournament {
+        /// Print one JSON object
+        #[arg(long)]
+        json: bool,
+    },
+    /// How long the bridge to a board takes from a setpoint to the first byte on the line
+    Board {
         /// Print one JSON object
         #[arg(long)]
         json: bool,
@@ -308,6 +450,35 @@ pub(crate) enum Bench {
         #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u32).range(6..100_000))]
         injections: u32,
     },
+    /// Every fault a robot on two computers meets, while it drives: what is lost, what is told, and that it drives again
+    Faults(crate::bench::faults::Faults),
+    /// What a fleet of emulated robots at 10 Hz costs, and how late its beats come
+    Fleet {
+        /// Print one JSON object
+        #[arg(long)]
+        json: bool,
+        /// How many robots; each is four processes
+        #[arg(long, default_value_t = 10, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=200))]
+        robots: u32,
+    },
+    /// How many messages a second one core records, and what kills leave of a recording
+    Record {
+        /// Print one JSON object
+        #[arg(long)]
+        json: bool,
+        /// How many recorders to kill
+        #[arg(long, default_value_t = 40, value_name = "N", value_parser = clap::value_parser!(u32).range(1..100_000))]
+        kills: u32,
+    },
+    /// What it costs those who drive that 5 and 50 taps look on, and that one of them is frozen
+    Taps {
+        /// Print one JSON object
+        #[arg(long)]
+        json: bool,
+        /// How many messages in each phase, a hundred a second
+        #[arg(long, default_value_t = 1000, value_name = "N", value_parser = clap::value_parser!(u32).range(100..1_000_000))]
+        rounds: u32,
+    },
     /// A query and a hop of Axle against bare Zenoh, side by side
     Mesh {
         /// Print one JSON object
@@ -315,6 +486,15 @@ pub(crate) enum Bench {
         json: bool,
         /// How many rounds of each
         #[arg(long, default_value_t = 5000, value_name = "N", value_parser = clap::value_parser!(u32).range(100..1_000_000))]
+        rounds: u32,
+    },
+    /// How long a measurement takes through the navigator, in the mesh
+    Navigator {
+        /// Print one JSON object
+        #[arg(long)]
+        json: bool,
+        /// How many poses
+        #[arg(long, default_value_t = 1000, value_name = "N", value_parser = clap::value_parser!(u32).range(100..1_000_000))]
         rounds: u32,
     },
 }
@@ -330,6 +510,11 @@ pub(crate) enum Page {
     Cli,
     /// docs/dead-reckoning.md
     DeadReckoning,
+}
+
+/// A word of the schema by its name there.
+fn word<T: DeserializeOwned>(text: &str) -> Result<T, String> {
+    serde_json::from_value(text.into()).map_err(|fault| fault.to_string())
 }
 
 fn way(text: &str) -> Result<WayTask, Refusal> {

@@ -4,6 +4,7 @@
 mod account;
 mod watch;
 
+use crate::bench::free_endpoint;
 use crate::catalog;
 use crate::cli::Demo;
 use crate::command::go::{Bar, cancel, follow};
@@ -16,9 +17,10 @@ use crate::topology::{self, Service, Topology};
 use account::Account;
 use anyhow::Context as _;
 use axle_mesh::{Mesh, Patience, Retry};
+use axle_robot::BoardKind;
 use axle_schema::task::{Accepted, GoAsk, PilotProgress};
 use axle_schema::{RobotId, key};
-use std::net::TcpListener;
+use std::net::{SocketAddr, TcpListener};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -37,11 +39,31 @@ pub(crate) async fn demo(settings: &Settings, args: Demo) -> anyhow::Result<()> 
         })?;
     let robot = settings.one_robot()?;
     let files = Files::prepare(&args.out)?;
-    let topology = build_topology(&args, corrector.name, &robot, &files)?;
+    if args.board.is_some_and(|kind| !kind.has_encoders()) {
+        return Err(usage("--board: this board measures nothing, so that nobody could drive by it"));
+    }
+    let mut topology = build_topology(&args, corrector.name, &robot, &files)?;
+    let page = match args.page {
+        Some(page) => Some(free_page(page)?),
+        None => None,
+    };
+    if let Some(page) = page {
+        topology.add_page(page, None, None)?;
+    }
+    if let Some(kind) = args.board {
+        put_on_a_board(&mut topology, kind, &robot, &files);
+    }
     let mut stop = crate::signal::stop()?;
     let log = Log::File(Arc::new(Mutex::new(std::fs::File::create(&files.log).context("create the log")?)));
     let (supervisor, endpoint) = start(settings, &topology, &log, &files, &mut stop).await?;
+    if let Some(page) = page {
+        note(&format!("watch it at http://{page}"));
+    }
     let driven = drive(settings, &args, &robot, &endpoint, corrector.name, &supervisor, &mut stop).await;
+    if let (Some(page), Ok(_)) = (page, &driven) {
+        note(&format!("the robot is yours at http://{page}; Ctrl-C ends"));
+        stop.wait().await;
+    }
     supervisor.stop().await;
     let driven =
         driven.with_context(|| format!("the demo did not end well; {} says more", files.log.display()))?;
@@ -50,11 +72,24 @@ pub(crate) async fn demo(settings: &Settings, args: Demo) -> anyhow::Result<()> 
     account.verdict()
 }
 
+/// The address of the page, or the next one that is free: the demonstration says it before anybody asks.
+fn free_page(wanted: SocketAddr) -> anyhow::Result<SocketAddr> {
+    let ports = wanted.port()..=wanted.port().saturating_add(9);
+    for port in ports {
+        if let Ok(free) = TcpListener::bind(SocketAddr::new(wanted.ip(), port)) {
+            return Ok(free.local_addr()?);
+        }
+    }
+    Err(usage(format!("--page {wanted}: neither this port nor one of the nine after it is free")))
+}
+
 /// What the demonstration writes.
 pub(crate) struct Files {
     chart: std::path::PathBuf,
     recording: std::path::PathBuf,
     log: std::path::PathBuf,
+    /// The link to the terminal of an emulated board, while there is one.
+    port: std::path::PathBuf,
 }
 
 impl Files {
@@ -64,8 +99,12 @@ impl Files {
             usage(format!("--out {}: cannot make this directory: {fault}", out.display()))
         })?;
         let out = std::path::absolute(out)?;
-        let files =
-            Self { chart: out.join("demo.svg"), recording: out.join("demo.mcap"), log: out.join("demo.log") };
+        let files = Self {
+            chart: out.join("demo.svg"),
+            recording: out.join("demo.mcap"),
+            log: out.join("demo.log"),
+            port: out.join("board"),
+        };
         for file in [&files.chart, &files.recording, &files.log] {
             match std::fs::remove_file(file) {
                 Err(fault) if fault.kind() != std::io::ErrorKind::NotFound => {
@@ -106,6 +145,25 @@ fn build_topology(args: &Demo, corrector: &str, robot: &RobotId, files: &Files) 
     Ok(topology)
 }
 
+/// The emulator plays a board, and another service drives that through a serial line, with a body as such robots have.
+fn put_on_a_board(topology: &mut Topology, kind: BoardKind, robot: &RobotId, files: &Files) {
+    for body in topology.robots.values_mut() {
+        *body = kind.body();
+    }
+    let (board, port) = (Some(kind.name().to_owned()), Some(files.port.display().to_string()));
+    let mut bridge = None;
+    for service in topology.services.iter_mut().filter(|service| service.kind == "emulator") {
+        (service.board, service.port) = (board.clone(), port.clone());
+        // Nobody can be hurt by an emulated robot.
+        let mut gate = toml::Table::new();
+        gate.insert("starts_enabled".into(), true.into());
+        let params = [("gate".to_owned(), gate.into())].into_iter().collect();
+        bridge =
+            Some(Service { kind: "robot".into(), robot: Some(robot.clone()), params, ..service.clone() });
+    }
+    topology.services.extend(bridge);
+}
+
 /// Starts everything on a free port and waits until all are alive.
 async fn start(
     settings: &Settings,
@@ -114,14 +172,10 @@ async fn start(
     files: &Files,
     stop: &mut Stop,
 ) -> anyhow::Result<(Supervisor, String)> {
-    let port = TcpListener::bind("127.0.0.1:0")
-        .and_then(|free| free.local_addr())
-        .context("find a free port")?
-        .port();
-    let endpoint = format!("tcp/127.0.0.1:{port}");
+    let endpoint = free_endpoint()?;
     let (host, _) = topology.host(None)?;
     let started = Instant::now();
-    let supervisor = Supervisor::start(topology, host, &endpoint, &settings.log, None, log)?;
+    let supervisor = Supervisor::start(topology, host, &endpoint, None, &settings.log, None, log)?;
     let alive = tokio::select! {
         alive = all_alive(settings, &endpoint, &supervisor) => alive,
         () = stop.wait() => Err(anyhow::anyhow!("ended before the mesh was up")),
@@ -156,7 +210,7 @@ async fn drive(
     supervisor: &Supervisor,
     stop: &mut Stop,
 ) -> anyhow::Result<Driven> {
-    let mut own = settings.mesh("demo", Some(robot));
+    let mut own = settings.mesh("demo", Some(robot))?;
     own.connect = vec![endpoint.to_owned()];
     let mesh = join(own, Patience::AtMost(PATIENCE)).await?;
     let watch = Watch::start(&mesh, robot, corrector)?;
@@ -164,7 +218,7 @@ async fn drive(
         .await
         .context("no pose of the emulated robot came within 5 s")?;
     let words = mesh.inbox(&key::GO_PROGRESS.of(robot), 64)?;
-    let ask = GoAsk { way: args.way.clone(), corrector: Some(corrector.to_owned()) };
+    let ask = GoAsk { way: args.way.clone(), corrector: Some(corrector.to_owned()), confirm: Vec::new() };
     let Accepted { task } = mesh.ask(&key::GO, Some(robot), &ask, PATIENCE, Retry::Never).await?;
     let bar = Bar::new();
     let end = tokio::select! {

@@ -36,6 +36,11 @@ impl<R: Read> Lines<R> {
 
     /// The value of the next line, or why it has none; `None` at the end. Blank lines separate nothing and mean nothing.
     pub(crate) fn read(&mut self) -> io::Result<Option<Result<Value, String>>> {
+        self.read_as()
+    }
+
+    /// As [`Lines::read`], without a value between line and datum.
+    pub(crate) fn read_as<T: DeserializeOwned>(&mut self) -> io::Result<Option<Result<T, String>>> {
         loop {
             self.line.clear();
             if self.input.by_ref().take(LONGEST).read_until(b'\n', &mut self.line)? == 0 {

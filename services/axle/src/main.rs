@@ -3,6 +3,7 @@
 //! `main` only joins: it reads the command line, starts the log and hands over. Exit codes: 0 done, 1 failed, 2 the
 //! command line or a file is wrong.
 
+mod access;
 mod batch;
 mod bench;
 mod catalog;
@@ -11,22 +12,36 @@ mod cli;
 mod command;
 mod conform;
 mod demo;
+mod keys;
 mod lines;
+mod log;
+mod logins;
+mod notify;
 mod out;
 mod params;
 mod path;
+mod replay;
 mod run;
 mod settings;
 mod signal;
 mod supervisor;
 mod topology;
+mod unread;
+mod why;
 
 use clap::Parser as _;
 use std::process::ExitCode;
 
+/// By how much the priority of those who only look on is lowered, of at most 19: fifty taps on the two cores of a robot
+/// are then hardly felt by its commands.
+const COURTESY: i32 = 15;
+
 fn main() -> ExitCode {
     let cli = cli::Cli::parse();
-    settings::start_log(&cli.settings.log);
+    log::start(&cli.settings.log, cli.settings.log_format);
+    if cli.command.looks_on() {
+        give_way();
+    }
     // Zenoh needs a runtime of several threads; two are enough for a service.
     let runtime = match tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build() {
         Ok(runtime) => runtime,
@@ -35,8 +50,17 @@ fn main() -> ExitCode {
     let result = runtime.block_on(command::dispatch(cli));
     // A thread that still waits for a router must not keep the process.
     runtime.shutdown_background();
+    log::lane::end();
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(fault) => out::fail(&fault),
+    }
+}
+
+/// Lets whoever drives have the processor first. All threads that are started later inherit it, so it comes before them.
+fn give_way() {
+    // A system that refuses takes nothing but this courtesy.
+    if let Err(fault) = rustix::process::nice(COURTESY) {
+        tracing::debug!("cannot lower the own priority: {fault}");
     }
 }

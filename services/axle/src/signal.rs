@@ -19,6 +19,16 @@ impl Stop {
         // An error means that nobody can say so any more, which is a reason to stop as well.
         drop(self.stopped.wait_for(|stopped| *stopped).await);
     }
+    /// The same, but after this time at the latest.
+    pub(crate) fn or_after(mut self, time: std::time::Duration) -> Self {
+        let (sender, stopped) = watch::channel(false);
+        tokio::spawn(async move {
+            drop(tokio::time::timeout(time, self.wait()).await);
+            // A sender that goes means the same.
+            let _ = sender.send(true);
+        });
+        Self { stopped }
+    }
     /// Whether it is time to stop.
     pub(crate) fn is_due(&self) -> bool {
         *self.stopped.borrow()

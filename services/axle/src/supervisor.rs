@@ -4,9 +4,11 @@
 //! them in order: the correctors first, which give the wheels back, then the rest, with the process that owns the wheels
 //! braking before it ends, then the recorder, which has heard all that, and the router last. A child whose supervisor is killed sees the end of its stdin and ends too.
 
-use crate::out::note;
+use crate::catalog;
+use crate::keys::Owner;
+use crate::log::lane;
 use crate::signal::PARENT;
-use crate::topology::Topology;
+use crate::topology::{Place, Topology};
 use anyhow::Context as _;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -30,6 +32,9 @@ const ENDING: Duration = Duration::from_millis(1200);
 /// Whoever has not ended so long after the last was told to is killed.
 const LAST: Duration = Duration::from_millis(500);
 
+/// Who owns wheels and measures them; they begin when the recorder is there.
+const OWNERS: [&str; 3] = ["emulator", "composed", "robot"];
+
 /// Where the children's words go.
 #[derive(Clone)]
 pub(crate) enum Log {
@@ -42,7 +47,9 @@ pub(crate) enum Log {
 impl Log {
     fn line(&self, name: &str, line: &str) {
         match self {
-            Self::Prefixed => note(&format!("{name:>12} | {line}")),
+            // A line of JSON names its service itself.
+            Self::Prefixed if line.starts_with('{') => lane::line(line),
+            Self::Prefixed => lane::line(&format!("{name:>12} | {line}")),
             Self::File(file) => {
                 let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
                 // A log that cannot be written must not stop a robot.
@@ -53,7 +60,7 @@ impl Log {
 }
 
 /// Who is told to end together, by name, and how long they may take.
-type Stage = (fn(&str) -> bool, Duration);
+type Stage = (fn(&Job) -> bool, Duration);
 
 /// What to run.
 #[derive(Clone, Debug)]
@@ -63,11 +70,22 @@ pub(crate) struct Job {
     /// The robot, where one is named.
     pub(crate) robot: Option<String>,
     args: Vec<String>,
+    place: Place,
+}
+
+impl Job {
+    /// Whether it turns or counts wheels that another service owns: it must be there until they stand.
+    fn is_motor(&self) -> bool {
+        let plays_board = self.name == "emulator" && self.args.iter().any(|arg| arg == "--board");
+        plays_board || self.name.starts_with("motor-") || self.name.starts_with("encoder-")
+    }
 }
 
 /// The children of one computer.
 pub(crate) struct Supervisor {
     children: Vec<Watched>,
+    /// Whether those who own wheels wait for the recorder.
+    held: watch::Sender<bool>,
     /// Written parameters; removed with the supervisor.
     _params: ParamsDirectory,
 }
@@ -89,8 +107,8 @@ impl Drop for ParamsDirectory {
 }
 
 impl Supervisor {
-    /// Starts the router and the services of one computer. Stops are kept in `state`, or no longer than the supervisor
-    /// lives.
+    /// Starts the router and the services of one computer, each with its identity of `keys`. Stops are kept in `state`,
+    /// or no longer than the supervisor lives.
     ///
     /// # Errors
     /// When a parameter file cannot be written; children that cannot start are restarted and logged.
@@ -98,19 +116,26 @@ impl Supervisor {
         topology: &Topology,
         host: &str,
         endpoint: &str,
+        keys: Option<&Path>,
         level: &str,
         state: Option<&Path>,
         log: &Log,
     ) -> anyhow::Result<Self> {
-        let directory = std::env::temp_dir().join(format!("axle-{}", std::process::id()));
+        // Whoever starts several computers has a supervisor for each.
+        let directory = std::env::temp_dir().join(format!("axle-{}-{host}", std::process::id()));
         std::fs::create_dir_all(&directory).context("make a directory for parameters")?;
         let params = ParamsDirectory(directory);
-        let mut jobs = vec![Job {
-            name: "router".into(),
-            robot: None,
-            args: ["router", "--listen", endpoint, "--log", level].map(String::from).to_vec(),
-        }];
+        let lease = topology.lease_ms.map(|ms| ["--lease".to_owned(), ms.to_string()]);
+        let links = |owner: &Owner| {
+            let identity = keys.map(|keys| keys.join(owner.to_string()).display().to_string());
+            let identity = identity.map(|directory| ["--identity".to_owned(), directory]);
+            lease.clone().into_iter().chain(identity).flatten()
+        };
+        let mut args = ["router", "--listen", endpoint, "--log", level].map(String::from).to_vec();
+        args.extend(links(&Owner::Router { host: host.to_owned() }));
         let described = topology.hosts.get(host);
+        let place = described.map(|host| host.place.clone()).unwrap_or_default();
+        let mut jobs = vec![Job { name: "router".into(), robot: None, args, place: place.clone() }];
         for link in described.iter().flat_map(|host| &host.links) {
             jobs[0].args.extend(["--link".into(), link.clone()]);
         }
@@ -121,8 +146,16 @@ impl Supervisor {
             let mut args = ["run", &service.kind, "--connect", endpoint, "--host", host, "--log", level]
                 .map(String::from)
                 .to_vec();
+            if let Some(entry) = catalog::find(&service.kind) {
+                args.extend(links(&Owner::Service { kind: entry.name, robot: service.robot.clone() }));
+            }
             if let Some(robot) = &service.robot {
                 args.extend(["--robot".into(), robot.to_string()]);
+            }
+            for (flag, value) in [("--board", &service.board), ("--port", &service.port)] {
+                if let Some(value) = value {
+                    args.extend([flag.into(), value.clone()]);
+                }
             }
             for (input, from) in &service.inputs {
                 args.extend(["--input".into(), format!("{input}={from}")]);
@@ -136,11 +169,25 @@ impl Supervisor {
                 args.extend(["--params".into(), file.display().to_string()]);
             }
             let robot = service.robot.as_ref().map(ToString::to_string);
-            jobs.push(Job { name: service.kind.clone(), robot, args });
+            jobs.push(Job { name: service.kind.clone(), robot, args, place: place.clone() });
         }
         let program = std::env::current_exe().context("find the axle program")?;
-        let children = jobs.into_iter().map(|job| Watched::start(job, &program, log)).collect();
-        Ok(Self { children, _params: params })
+        // A recording that holds all that was ever measured can be replayed from the beginning of every service.
+        let (held, is_held) = watch::channel(jobs.iter().any(|job| job.name == "recorder"));
+        let children = jobs
+            .into_iter()
+            .map(|job| {
+                let waits = OWNERS.contains(&&*job.name).then(|| is_held.clone());
+                Watched::start(job, &program, log, waits)
+            })
+            .collect();
+        Ok(Self { children, held, _params: params })
+    }
+
+    /// The recorder is there, or is not waited for any longer: what measures begins.
+    pub(crate) fn begin(&self) {
+        // Nobody listens where nobody owns wheels.
+        let _ = self.held.send(false);
     }
 
     /// The jobs, in the order of their start, with the processes that do them now.
@@ -160,13 +207,13 @@ impl Supervisor {
     /// Ends all children in their order; within three seconds nothing is left.
     pub(crate) async fn stop(self) {
         let stages: [Stage; 4] = [
-            (|name| name.ends_with("-corrector") || name == "drive", GIVING_BACK),
-            (|name| name != "recorder" && name != "router" && !name.starts_with("motor-"), ENDING),
-            (|name| name == "recorder" || name.starts_with("motor-"), LAST),
+            (|job| job.name.ends_with("-corrector") || job.name == "drive", GIVING_BACK),
+            (|job| job.name != "recorder" && job.name != "router" && !job.is_motor(), ENDING),
+            (|job| job.name == "recorder" || job.is_motor(), LAST),
             (|_| true, LAST),
         ];
         for (is_due, patience) in stages {
-            let due: Vec<_> = self.children.iter().filter(|child| is_due(&child.job.name)).collect();
+            let due: Vec<_> = self.children.iter().filter(|child| is_due(&child.job)).collect();
             for child in &due {
                 child.tell(Signal::SIGTERM);
             }
@@ -184,16 +231,19 @@ impl Supervisor {
 }
 
 impl Watched {
-    fn start(job: Job, program: &Path, log: &Log) -> Self {
+    fn start(job: Job, program: &Path, log: &Log, held: Option<watch::Receiver<bool>>) -> Self {
         let pid = Arc::new(Mutex::new(None));
         let (ending, is_ending) = watch::channel(false);
-        let watching = tokio::spawn(watch_over(
-            job.clone(),
-            program.to_owned(),
-            log.clone(),
-            Arc::clone(&pid),
-            is_ending,
-        ));
+        let watch =
+            watch_over(job.clone(), program.to_owned(), log.clone(), Arc::clone(&pid), is_ending.clone());
+        let watching = tokio::spawn(async move {
+            if let Some(mut held) = held
+                && !released(&mut held, is_ending).await
+            {
+                return;
+            }
+            watch.await;
+        });
         Self { job, pid, ending, watching }
     }
     fn pid(&self) -> Option<u32> {
@@ -210,6 +260,14 @@ fn send(pid: &Mutex<Option<u32>>, signal: Signal) {
     if let Some(pid) = pid.and_then(|pid| i32::try_from(pid).ok()) {
         // A child that has just ended by itself is what was wanted.
         let _ = kill(Pid::from_raw(pid), signal);
+    }
+}
+
+/// Waits until a child may begin; `false` when it is told to end before.
+async fn released(held: &mut watch::Receiver<bool>, mut ending: watch::Receiver<bool>) -> bool {
+    tokio::select! {
+        _ = held.wait_for(|held| !held) => true,
+        _ = ending.wait_for(|ending| *ending) => false,
     }
 }
 
@@ -264,13 +322,27 @@ async fn watch_over(
 }
 
 fn spawn(job: &Job, program: &Path) -> std::io::Result<Child> {
-    Command::new(program)
+    let mut command = match job.place.within.split_first() {
+        Some((within, args)) => {
+            let mut command = Command::new(within);
+            command.args(args).arg(program);
+            command
+        }
+        None => Command::new(program),
+    };
+    command
         .args(&job.args)
+        .envs(job.place.variables.iter().map(|(name, value)| (name, value)))
         .env(PARENT, "stdin")
+        .env("AXLE_LOG_FORMAT", crate::log::format().name())
         .env_remove("AXLE_ROBOT")
         .env_remove("AXLE_SERVICE")
         .env_remove("AXLE_PARAMS")
         .env_remove("AXLE_LISTEN")
+        .env_remove("AXLE_IDENTITY")
+        .env_remove("AXLE_LEASE")
+        .env_remove("AXLE_BOARD")
+        .env_remove("AXLE_PORT")
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())

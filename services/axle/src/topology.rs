@@ -5,23 +5,29 @@ mod wiring;
 pub(crate) use wiring::{Node, Wire, check_inputs};
 
 use crate::catalog::{self, Scope};
+use crate::keys::Owner;
 use crate::out::usage;
+use axle_mesh::identity::{CERTIFICATE_FILE, KEY_FILE};
+use axle_robot::BoardKind;
 use axle_schema::contract::Bounds as _;
 use axle_schema::{Drivetrain, RobotId};
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
+use std::net::SocketAddr;
 use std::path::Path;
 
 /// The topology that `axle up` and `axle demo` start from: one emulated robot and its planners on one computer.
 pub(crate) const DEFAULT: &str = include_str!("../../../deploy/topologies/demo.toml");
 
 /// The most services of one topology.
-const MAX_SERVICES: usize = 256;
+const MAX_SERVICES: usize = 1000;
 
 /// A topology file.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Topology {
+    /// After how many milliseconds of silence a process is taken for dead; 1000 unless said.
+    pub(crate) lease_ms: Option<u32>,
     /// The computers.
     pub(crate) hosts: BTreeMap<String, Host>,
     /// The robots.
@@ -48,6 +54,18 @@ pub(crate) struct Host {
     /// Whether the router may listen beyond this computer without encryption; whoever reaches it can drive the robots.
     #[serde(default)]
     pub(crate) insecure_lan: bool,
+    /// Where its processes run; no file says that.
+    #[serde(skip)]
+    pub(crate) place: Place,
+}
+
+/// Where the processes of a computer run, if they do not simply run here: for trials.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Place {
+    /// The program that runs them, and its arguments before theirs: `ip netns exec NAME`.
+    pub(crate) within: Vec<String>,
+    /// Variables of their environment.
+    pub(crate) variables: Vec<(String, String)>,
 }
 
 /// A service.
@@ -64,6 +82,10 @@ pub(crate) struct Service {
     /// hear instead.
     #[serde(default)]
     pub(crate) inputs: BTreeMap<String, String>,
+    /// The board that a robot has or an emulator plays.
+    pub(crate) board: Option<String>,
+    /// The port of the board.
+    pub(crate) port: Option<String>,
     /// Parameters that differ from the defaults.
     #[serde(default)]
     pub(crate) params: toml::Table,
@@ -100,6 +122,21 @@ impl Topology {
             "services: {} are too many, at most {MAX_SERVICES}",
             self.services.len()
         );
+        let leases = axle_mesh::config::LEASES;
+        if let Some(ms) = self.lease_ms.filter(|ms| !leases.contains(ms)) {
+            anyhow::bail!(
+                "lease_ms: {ms} is out of range, allowed is {} to {}",
+                leases.start(),
+                leases.end()
+            );
+        }
+        for (name, host) in &self.hosts {
+            let endpoints = host.links.iter().chain([&host.router]);
+            for endpoint in endpoints {
+                axle_mesh::config::check_endpoint(endpoint)
+                    .map_err(|fault| anyhow::anyhow!("hosts.{name}: {fault}"))?;
+            }
+        }
         for (name, robot) in &self.robots {
             robot.check().map_err(|refusal| anyhow::anyhow!("robots.{}: {refusal}", name.0))?;
         }
@@ -113,6 +150,15 @@ impl Topology {
                 anyhow::bail!("{at}: works for one robot; add robot = \"r1\"");
             }
             check_inputs(&service.inputs, entry).map_err(|fault| fault.context(at.clone()))?;
+            if (service.board.is_some() || service.port.is_some()) && !catalog::takes_board(entry.name) {
+                anyhow::bail!("{at}: has no board; board and port are for robot and emulator");
+            }
+            service
+                .board
+                .as_deref()
+                .map(BoardKind::parse)
+                .transpose()
+                .map_err(|refusal| anyhow::anyhow!("{at}: {refusal}"))?;
             match &service.host {
                 Some(host) if !self.hosts.contains_key(host) => anyhow::bail!("{at}: unknown host {host:?}"),
                 None if self.hosts.len() > 1 => anyhow::bail!("{at}: several hosts are named; add host = …"),
@@ -149,6 +195,46 @@ impl Topology {
                 names()
             ))),
         }
+    }
+
+    /// Adds the page of a browser to a computer, unless a gateway is there already. Beyond this computer it has the
+    /// certificate and the logins of the directory of keys.
+    ///
+    /// # Errors
+    /// As [`Topology::host`].
+    pub(crate) fn add_page(
+        &mut self,
+        listen: SocketAddr,
+        host: Option<&str>,
+        keys: Option<&Path>,
+    ) -> anyhow::Result<()> {
+        let (host, _) = self.host(host)?;
+        let host = host.to_owned();
+        if self.services_of(&host).all(|service| service.kind != "gateway") {
+            let mut params: toml::Table =
+                [("listen".to_owned(), listen.to_string().into())].into_iter().collect();
+            if let Some(keys) = keys.filter(|_| !listen.ip().is_loopback()) {
+                let page = keys.join(Owner::Page { host: host.clone() }.to_string());
+                for (name, path) in [
+                    ("certificate", page.join(CERTIFICATE_FILE)),
+                    ("key", page.join(KEY_FILE)),
+                    ("logins", keys.join(crate::logins::FILE)),
+                ] {
+                    let path = std::path::absolute(path)?;
+                    params.insert(name.to_owned(), path.display().to_string().into());
+                }
+            }
+            let (kind, robot) = ("gateway".to_owned(), None);
+            let (inputs, board, port) = (BTreeMap::new(), None, None);
+            self.services.push(Service { kind, host: Some(host), robot, inputs, params, board, port });
+        }
+        Ok(())
+    }
+
+    /// The computer that a service runs on.
+    pub(crate) fn host_of<'a>(&'a self, node: &'a Node<'_>) -> &'a str {
+        let only = self.hosts.keys().next().map_or("", String::as_str);
+        node.service.host.as_deref().unwrap_or(only)
     }
 
     /// The services of one computer.
@@ -189,6 +275,22 @@ mod tests {
     }
 
     #[test]
+    fn a_page_is_added_unless_there_is_one() {
+        let mut topology = Topology::parse(DEFAULT).expect("the shipped file");
+        let before = topology.services.len();
+        for _ in 0..2 {
+            let address = SocketAddr::from(([127, 0, 0, 1], 8080));
+            topology.add_page(address, None, None).expect("one host");
+            assert_eq!(topology.services.len(), before + 1);
+        }
+        let page = topology.services.last().expect("the gateway");
+        let params = topology.params_of(page).expect("parameters");
+        assert_eq!((&*page.kind, params["listen"].as_str()), ("gateway", Some("127.0.0.1:8080")));
+        assert!(topology.check().is_ok());
+        assert!(topology.add_page(SocketAddr::from(([127, 0, 0, 1], 1)), Some("moon"), None).is_err());
+    }
+
+    #[test]
     fn a_wrong_topology_is_refused_by_name() {
         let check = |text: &str, words: &str| {
             let text = format!("[hosts.local]\nrouter = \"tcp/127.0.0.1:7447\"\n{text}");
@@ -202,6 +304,10 @@ mod tests {
         check("[[services]]\nkind = \"navigator\"\nrobot = \"a/b\"", "a/b");
         let twice = "[[services]]\nkind = \"navigator\"\nrobot = \"r1\"\n";
         check(&twice.repeat(2), "stands twice");
+        check(
+            "[hosts.moon]\nrouter = \"udp/127.0.0.1:7447\"\n[[services]]\nkind = \"pathfinder\"\nhost = \"moon\"",
+            "hosts.moon",
+        );
         check("[[services]]\nkind = \"pathfinder\"\n[robots.r1]\ntrack = -1", "track");
     }
 }

@@ -9,7 +9,6 @@ mod commander;
 mod history;
 mod injection;
 mod report;
-mod wire;
 
 pub(crate) use commander::command;
 
@@ -75,7 +74,7 @@ impl Bed {
         let topology = Topology::parse(&text)?;
         let (host, _) = topology.host(None)?;
         let log = Log::File(Arc::new(Mutex::new(std::fs::File::create(scratch.join("bench.log"))?)));
-        let supervisor = Supervisor::start(&topology, host, &endpoint, &settings.log, None, &log)?;
+        let supervisor = Supervisor::start(&topology, host, &endpoint, None, &settings.log, None, &log)?;
         let alive = tokio::select! {
             alive = all_alive(settings, &endpoint, &supervisor) => alive,
             () = stop.wait() => Err(anyhow::anyhow!("ended before the mesh was up")),
@@ -101,7 +100,7 @@ impl Bed {
         bar: &ProgressBar,
     ) -> anyhow::Result<Vec<Injected>> {
         note(&format!("{injections} kills, freezes and cuts of whoever commands, on {ROBOTS} robots …"));
-        let mut own = settings.mesh("bench", None);
+        let mut own = settings.mesh("bench", None)?;
         own.connect = vec![self.endpoint.clone()];
         let mesh = join(own, Patience::AtMost(Duration::from_secs(5))).await?;
         let sites = (0..ROBOTS).map(|index| self.measure_one(&mesh, index, injections, bar));

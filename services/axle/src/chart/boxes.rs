@@ -9,8 +9,10 @@ use plotters::style::FontTransform;
 /// Height of a row, and room above and below all of them, in pixels.
 const ROW: u32 = 34;
 const TOP: u32 = 14;
-/// Less than this cannot be told from nothing.
-const LEAST: f64 = 1e-3;
+/// Less than this cannot be told from nothing: 0.1 mm, where errors in centimetres are drawn.
+const LEAST: f64 = 1e-2;
+/// The axis has at least so many powers of ten.
+const POWERS: f64 = 2.0;
 /// The most rows of one chart.
 const MOST: usize = 12;
 
@@ -49,7 +51,7 @@ pub(super) fn draw(axis: &str, spreads: &[Spread], sheet: &Sheet<'_>) -> anyhow:
     let (low, high) =
         all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
     let (low, high) =
-        if low <= high { (low.floor(), high.ceil().max(low.floor() + 1.0)) } else { (-1.0, 1.0) };
+        if low <= high { (low.floor(), high.ceil().max(low.floor() + POWERS)) } else { (-1.0, 1.0) };
     let tall = plot_height(spreads.len());
     let mut chart = ChartBuilder::on(&area)
         .x_label_area_size(px(page::BOTTOM))

@@ -32,6 +32,7 @@ pub(super) const ORANGE: RGBColor = RGBColor(230, 159, 0);
 pub(super) const SKY: RGBColor = RGBColor(86, 180, 233);
 pub(super) const INK: RGBColor = RGBColor(40, 40, 40);
 pub(super) const GRID: RGBColor = RGBColor(226, 226, 226);
+pub(super) const WALL: RGBColor = RGBColor(96, 96, 96);
 const FAINT: RGBColor = RGBColor(120, 120, 120);
 
 /// Pixels in the units of the drawing.

@@ -1,11 +1,12 @@
 //! Paths in the plane, with the same scale in both directions.
 
-use super::PathSeries;
 use super::page::{
-    self, Area, BLUE, GREEN, GREY, INK, ORANGE, PLOT, PURPLE, SKY, Sheet, VERMILION, at, failed, font, line,
-    px,
+    self, Area, BLUE, GREEN, GREY, GRID, INK, ORANGE, PLOT, PURPLE, SKY, Sheet, VERMILION, WALL, at, failed,
+    font, line, px,
 };
 use super::thin::{bounds, is_fine, thin};
+use super::{PathSeries, Wall};
+use axle_maps::Ink;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -23,6 +24,10 @@ const SHARE: f64 = 0.86;
 pub(super) struct Plane<'a> {
     paths: &'a [PathSeries],
     way_points: Vec<(f64, f64)>,
+    walls: &'a [Wall],
+    /// Outlines of where something may be, and what the legend calls them.
+    outlines: &'a [Vec<(f64, f64)>],
+    outlines_name: &'static str,
     centre: (f64, f64),
     /// Metres in a pixel, in both directions.
     pixel: f64,
@@ -31,10 +36,11 @@ pub(super) struct Plane<'a> {
 }
 
 impl<'a> Plane<'a> {
-    pub(super) fn new(paths: &'a [PathSeries], way_points: &[(f64, f64)]) -> Self {
+    pub(super) fn new(paths: &'a [PathSeries], way_points: &[(f64, f64)], walls: &'a [Wall]) -> Self {
         let paths = paths.get(..MAX_SERIES).unwrap_or(paths);
         let way_points: Vec<_> = way_points.iter().copied().filter(is_fine).collect();
-        let all = paths.iter().flat_map(|path| &path.points).chain(&way_points).copied();
+        let corners = walls.iter().flat_map(|wall| &wall.1);
+        let all = paths.iter().flat_map(|path| &path.points).chain(&way_points).chain(corners).copied();
         let found = bounds(all);
         let [(left, right), (low, high)] = found.unwrap_or_default();
         let (wide, tall) = (right - left, high - low);
@@ -42,14 +48,26 @@ impl<'a> Plane<'a> {
         let ratio = if wide > 0.0 { tall / wide } else { tall.clamp(0.4, 1.0) };
         let height = (f64::from(PLOT) * ratio).clamp(HEIGHTS[0], HEIGHTS[1]);
         // Below the paths the legend has start, end and way point.
-        let height = height.max(f64::from(page::legend_height(paths.len() + 3) - page::BOTTOM));
+        let height = height.max(f64::from(page::legend_height(paths.len() + 4) - page::BOTTOM));
         let pixel = (wide / f64::from(PLOT)).max(tall / height) / SHARE;
         // A single point has no extent: a metre around it shows where it is.
         let pixel = if pixel > 0.0 { pixel.max(1e-5) } else { 1.2 / height };
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "150 to 600")]
         let height = height as u32;
         let centre = (f64::midpoint(left, right), f64::midpoint(low, high));
-        Self { paths, way_points, centre, pixel, height, empty: found.is_none() }
+        let (outlines, outlines_name) = (&[][..], "");
+        let empty = found.is_none();
+        Self { paths, way_points, walls, outlines, outlines_name, centre, pixel, height, empty }
+    }
+    /// The same, of a square of this many metres at least: who turns on the spot moves by millimetres, which say nothing.
+    pub(super) fn at_least(mut self, metres: f64) -> Self {
+        self.pixel = self.pixel.max(metres / f64::from(self.height));
+        self
+    }
+    /// The same with outlines below the paths.
+    pub(super) const fn with_outlines(mut self, name: &'static str, outlines: &'a [Vec<(f64, f64)>]) -> Self {
+        (self.outlines, self.outlines_name) = (outlines, name);
+        self
     }
 
     /// Height of this part of the page, in pixels.
@@ -63,7 +81,15 @@ impl<'a> Plane<'a> {
         let x = self.centre.0 - half.0..self.centre.0 + half.0;
         let y = self.centre.1 - half.1..self.centre.1 + half.1;
         let mut chart = page::plot(&area, self.height, (x, "x, forward (m)"), (y, "y, left (m)"))?;
+        self.draw_walls(&chart.plotting_area().strip_coord_spec())?;
         let mut ends = Vec::new();
+        for outline in self.outlines {
+            let points: Vec<_> = outline.iter().copied().filter(is_fine).collect();
+            chart.draw_series(LineSeries::new(points, line(PURPLE.into(), 12))).map_err(failed)?;
+        }
+        if !self.outlines.is_empty() {
+            legend.line(line(PURPLE.into(), 12), self.outlines_name)?;
+        }
         for path in self.paths {
             let points = thin(&path.points, (self.pixel, self.pixel));
             if let (Some(&first), Some(&last)) = (points.first(), points.last()) {
@@ -94,6 +120,19 @@ impl<'a> Plane<'a> {
         }
         if self.empty {
             page::remark(&plot, self.height, "nothing to drive")?;
+        }
+        Ok(())
+    }
+
+    /// The map lies below everything else.
+    fn draw_walls(&self, plot: &Area<'_>) -> anyhow::Result<()> {
+        for (ink, corners) in self.walls {
+            let colour = match ink {
+                Ink::Unknown => GRID,
+                Ink::Occupied => WALL,
+            };
+            let corners = corners.map(|corner| self.place(corner));
+            plot.draw(&Polygon::new(corners, colour.filled())).map_err(failed)?;
         }
         Ok(())
     }

@@ -188,3 +188,16 @@ fn names_are_escaped_and_cut() {
     assert!(!svg.contains("<script") && svg.contains("&lt;script&gt;&amp;"));
     assert!(svg.contains('…'), "a long name is cut");
 }
+
+#[test]
+fn a_contest_on_the_spot_is_drawn_in_a_decimetre_and_tenths_of_a_millimetre() {
+    let points = vec![(0.0, 0.0), (0.001, -0.0005), (0.0, 0.0)];
+    let path = PathSeries { name: "d-corrector".into(), points: points.clone(), ink: 1 };
+    let spread = Spread { name: "d-corrector".into(), values: vec![1e-6, 2e-6, 3e-6] };
+    let svg = contest_chart("turn", &[PathSeries::planned(points), path], ("final error (cm)", &[spread]))
+        .expect("a chart");
+    check_xml(&svg);
+    let says = |label: &str| svg.lines().any(|line| line.trim() == label);
+    assert!(says("0.04") && !says("0.001") && !says("0.0005"), "the plane: {svg}");
+    assert!(says("0.01") && says("0.1") && says("1"), "the axis of the boxes: {svg}");
+}

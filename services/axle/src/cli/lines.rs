@@ -43,17 +43,27 @@ pub(crate) struct Convert {
 }
 
 /// Arguments of `axle chart`.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub(crate) struct Chart {
-    /// JSON lines as `axle convert` reads or writes them, or an MCAP recording; - is stdin; several are compared
-    #[arg(required = true, value_name = "FILE")]
+    /// JSON lines as `axle convert` reads or writes them, or an MCAP recording; - is stdin; several are compared. What
+    /// begins with axle/ and is no file are keys, which are listened to
+    #[arg(required = true, value_name = "FILE|KEYS")]
     pub(crate) files: Vec<String>,
+    /// How long to listen to keys, in seconds; Ctrl-C ends it earlier
+    #[arg(long = "for", default_value_t = 10.0, value_name = "SECONDS", value_parser = super::listening)]
+    pub(crate) seconds: f64,
     /// The distance between the wheels in metres, where a line has no "track"
     #[arg(long, value_name = "METRES", allow_hyphen_values = true)]
     pub(crate) track: Option<f64>,
-    /// Where to write the chart [default: stdout]
+    /// The map.yaml of the floor, drawn below the paths
+    #[arg(long, value_name = "FILE")]
+    pub(crate) map: Option<PathBuf>,
+    /// Where to write the chart; a name that ends with .png makes a PNG [default: stdout]
     #[arg(long, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
+    /// Make a PNG and no SVG
+    #[arg(long)]
+    pub(crate) png: bool,
 }
 
 /// Arguments of `axle estimate`.

@@ -20,7 +20,7 @@ pub(crate) struct Tournament {
     /// The scenarios: what is wrong with the robot [default: all]
     #[arg(long, value_name = "NAME", value_delimiter = ',', num_args = 1..)]
     pub(crate) scenarios: Vec<String>,
-    /// How often each corrector drives each course in each scenario [default: 10, and 3 for each try of --tune]
+    /// How often each corrector drives each course in each scenario [default: 10, and 1 for each try of --tune]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub(crate) runs: Option<u16>,
     /// What all accidents come from

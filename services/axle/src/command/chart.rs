@@ -1,23 +1,32 @@
-//! `axle chart FILE…`: draws whatever `axle convert` reads or writes, and recordings, as one SVG.
+//! `axle chart FILE|KEYS…`: draws whatever `axle convert` reads or writes, recordings, and what is said now, as one SVG or
+//! PNG.
 //!
 //! Each file is a run: a path, and where its lines tell it, the distances and the speeds of the wheels over time.
 //! Several runs lie over each other. A line that cannot be drawn is told on stderr with its number, and the others are
-//! drawn all the same; then the exit code is 1. No mesh is needed.
+//! drawn all the same; then the exit code is 1. A mesh is needed for keys only: what is said on them is recorded for a while
+//! beside the chart, and drawn as any recording is.
 
 mod recording;
 mod run;
 
-use crate::chart::{MAX_SERIES, Panel, PathSeries, WheelPoint, chart, demo_chart};
+use crate::chart::{
+    MAX_SERIES, MAX_WALLS, Panel, PathSeries, Wall, WheelPoint, believed_chart, floor_chart, png,
+};
 use crate::cli::Chart;
 use crate::lines::{Lines, words};
 use crate::out::{data, note, usage};
+use crate::run::map::read as read_map;
+use crate::run::recorder::Recording;
+use crate::settings::Settings;
 use anyhow::Context as _;
-use axle_schema::{Metres, Track};
+use axle_recorder::RecorderParams;
+use axle_schema::{Metres, Track, key};
 use recording::Heard;
 use run::Run;
 use std::fs::File;
-use std::io::{self, Read, Seek as _};
-use std::path::Path;
+use std::io::{self, Read, Seek as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// What an MCAP file begins with; no JSON does.
 const MCAP: [u8; 5] = *b"\x89MCAP";
@@ -29,8 +38,51 @@ enum Source {
     Recording(Heard),
 }
 
-/// Draws the files, or stdin for `-`.
-pub(super) fn draw(args: &Chart) -> anyhow::Result<()> {
+/// Draws the files, stdin for `-`, and what is said on keys.
+pub(super) async fn chart(settings: &Settings, args: &Chart) -> anyhow::Result<()> {
+    // What keys begin with; a file of such a name is drawn all the same.
+    let root = key::everything(None);
+    let root = root.trim_end_matches('*');
+    let is_key = |name: &&String| name.starts_with(root) && !Path::new(name.as_str()).exists();
+    let keys: Vec<_> = args.files.iter().filter(is_key).cloned().collect();
+    if keys.is_empty() {
+        return draw(args);
+    }
+    let heard = hear(settings, &keys, args.seconds).await?;
+    let mut files: Vec<_> = args.files.iter().filter(|name| !keys.contains(name)).cloned().collect();
+    files.insert(0, heard.0.display().to_string());
+    draw(&Chart { files, ..args.clone() })
+}
+
+/// A recording that is drawn and then removed.
+struct Brief(PathBuf);
+
+impl Drop for Brief {
+    fn drop(&mut self) {
+        // What cannot be removed is left to the system's own cleaning.
+        drop(std::fs::remove_file(&self.0));
+    }
+}
+
+/// Listens for a while.
+async fn hear(settings: &Settings, keys: &[String], seconds: f64) -> anyhow::Result<Brief> {
+    let heard = Brief(std::env::temp_dir().join(format!("axle-{}-now.mcap", std::process::id())));
+    let params = RecorderParams { file: Some(heard.0.clone()), derived: false, ..RecorderParams::default() };
+    let who = settings.robot.as_ref().map_or("all", axle_schema::RobotId::as_str);
+    let mut stop = crate::signal::stop()?.or_after(Duration::from_secs_f64(seconds));
+    let mesh = settings.join("chart").await?;
+    let recording = Recording::begin(&mesh, keys, who, params).map_err(|fault| {
+        let is_key = matches!(fault.downcast_ref(), Some(axle_mesh::Fault::KeyExpression(_)));
+        if is_key { usage(fault) } else { fault }
+    })?;
+    note(&format!("listening to {} for {seconds} s; Ctrl-C draws what came until then", keys.join(", ")));
+    let totals = recording.end(&mut stop).await?;
+    mesh.leave().await;
+    anyhow::ensure!(totals.samples > 0, "nothing was said on {} for {seconds} s", keys.join(", "));
+    Ok(heard)
+}
+
+fn draw(args: &Chart) -> anyhow::Result<()> {
     if args.files.len() > MAX_SERIES {
         return Err(usage(format!("{} files: at most {MAX_SERIES} can be told apart", args.files.len())));
     }
@@ -50,13 +102,19 @@ pub(super) fn draw(args: &Chart) -> anyhow::Result<()> {
         }
         sources.push((name, source));
     }
-    let svg = svg(&sources)?;
+    let floor = args.map.as_deref().map(read_map).transpose()?;
+    let walls = floor.map_or_else(Vec::new, |grid| axle_maps::areas(&grid, MAX_WALLS));
+    let svg = svg(&sources, &walls)?;
+    let is_png =
+        args.png || args.out.as_ref().is_some_and(|file| file.extension().is_some_and(|end| end == "png"));
+    let picture = if is_png { png(&svg)? } else { svg.into_bytes() };
     match &args.out {
         Some(file) => {
-            std::fs::write(file, svg).with_context(|| format!("write {}", file.display()))?;
+            std::fs::write(file, picture).with_context(|| format!("write {}", file.display()))?;
             note(&format!("drawn: {}", file.display()));
         }
-        None => data(svg.trim_end())?,
+        None if is_png => io::stdout().lock().write_all(&picture).context("write the picture")?,
+        None => data(String::from_utf8_lossy(&picture).trim_end())?,
     }
     anyhow::ensure!(bad == 0, "{bad} of {lines} lines could not be drawn");
     Ok(())
@@ -80,7 +138,7 @@ fn open(file: &str, track: Option<f64>, complain: &dyn Fn(&str)) -> anyhow::Resu
     let failed = |fault: io::Error| usage(format!("cannot read {file}: {fault}"));
     let mut input = File::open(file).map_err(failed)?;
     let mut magic = Vec::new();
-    input.by_ref().take(MCAP.len() as u64).read_to_end(&mut magic).map_err(failed)?;
+    Read::by_ref(&mut input).take(MCAP.len() as u64).read_to_end(&mut magic).map_err(failed)?;
     if magic == MCAP {
         return Ok(Source::Recording(Heard::read(Path::new(file), complain)?));
     }
@@ -100,10 +158,11 @@ fn collect(input: impl Read, track: Option<f64>, complain: &dyn Fn(&str)) -> any
 }
 
 /// The picture: a recording alone is drawn as the demo draws it, everything else as runs that are compared.
-fn svg(sources: &[(String, Source)]) -> anyhow::Result<String> {
+fn svg(sources: &[(String, Source)], walls: &[Wall]) -> anyhow::Result<String> {
     if let [(name, Source::Recording(heard))] = sources {
         anyhow::ensure!(!heard.is_empty(), "nothing to draw: {name} holds no plan and no pose");
-        return demo_chart(name, &heard.paths(), &heard.way_points, &heard.wheels);
+        let panels = heard.panels();
+        return believed_chart(name, &heard.paths(), &heard.way_points, (walls, &heard.ellipses()), &panels);
     }
     let paths: Vec<_> = sources
         .iter()
@@ -131,7 +190,7 @@ fn svg(sources: &[(String, Source)]) -> anyhow::Result<String> {
         .iter()
         .map(|(_, source)| match source {
             Source::Run(run, ..) => run.speeds(),
-            Source::Recording(_) => &[],
+            Source::Recording(heard) => heard.speeds(),
         })
         .collect();
     let panels: Vec<_> = [("wheel distance (m)", distances), ("wheel speed (m/s)", speeds)]
@@ -140,7 +199,7 @@ fn svg(sources: &[(String, Source)]) -> anyhow::Result<String> {
         .map(|(axis, runs)| Panel::of_runs(axis, &runs))
         .collect();
     let title: Vec<_> = sources.iter().map(|(name, _)| name.as_str()).collect();
-    chart(&title.join(", "), &paths, &[], &panels)
+    floor_chart(&title.join(", "), &paths, &[], walls, &panels)
 }
 
 #[cfg(test)]

@@ -3,7 +3,10 @@
 //! A process that exists may hang, and a token on the mesh outlives its owner by a lease. So a service is asked for
 //! its status over the router that it uses, a beat must go on between two answers, and a planner must answer a
 //! question of its trade. A router must carry a question and its answer between two sessions. What lies between two
-//! services is not looked at here.
+//! services is not looked at here but in [`pairs`], for `axle doctor` without `--self`.
+
+mod clocks;
+mod pairs;
 
 use crate::catalog::{self, Scope};
 use crate::cli::Doctor;
@@ -12,7 +15,8 @@ use crate::settings::Settings;
 use axle_mesh::{Mesh, Retry};
 use axle_schema::key::chunk;
 use axle_schema::presence::Status;
-use axle_schema::{DriveAsk, Geometry, Leg, Metres, PlanAsk, Refusal, RobotId, WayTask, id, key};
+use axle_schema::traffic::TrafficAsk;
+use axle_schema::{DriveAsk, Geometry, Leg, MapAsk, Metres, PlanAsk, Refusal, RobotId, WayTask, id, key};
 use std::future::Future;
 use std::pin::Pin;
 use std::time::Duration;
@@ -30,21 +34,25 @@ const STUCK: Duration = Duration::from_secs(1);
 /// # Errors
 /// What is wrong with it, and what to do.
 pub(super) async fn doctor(settings: &Settings, args: &Doctor) -> anyhow::Result<()> {
+    if !args.own {
+        if args.service.is_some() && std::env::var_os("AXLE_SERVICE").is_none() {
+            return Err(crate::out::usage("to look at one service, write `axle doctor --self SERVICE`"));
+        }
+        let topology = super::check::read(args.topology.as_deref())?;
+        return pairs::examine(settings, &topology, args.json).await;
+    }
     let started = Instant::now();
-    let found = if args.service == "router" {
-        router(settings).await
-    } else {
-        service(settings, &args.service).await
-    };
+    let name = args.service.as_deref().unwrap_or_default();
+    let found = if name == "router" { router(settings).await } else { service(settings, name).await };
     let ms = (started.elapsed().as_secs_f64() * 1e4).round() / 10.0;
     if args.json {
         let reason = found.as_ref().err().map(|fault| format!("{fault:#}"));
         let line = serde_json::json!({
-            "service": args.service, "healthy": found.is_ok(), "found": found.as_ref().ok(), "reason": reason, "ms": ms,
+            "service": name, "healthy": found.is_ok(), "found": found.as_ref().ok(), "reason": reason, "ms": ms,
         });
         data(&line.to_string())?;
     } else if let Ok(found) = &found {
-        data(&format!("{} is healthy: {found}, in {ms:.0} ms", args.service))?;
+        data(&format!("{name} is healthy: {found}, in {ms:.0} ms"))?;
     }
     found.map(drop)
 }
@@ -97,7 +105,7 @@ async fn examine(
     }
     if let Some((_, question)) = QUESTIONS.iter().find(|(service, _)| *service == name) {
         question(mesh, robot).await.map_err(|refusal| {
-            anyhow::anyhow!("{name} is alive but does not do its work: {refusal}; restart it")
+            anyhow::anyhow!("{name} is alive but does not do its work: {refusal}; its log says more")
         })?;
         found.push_str(", and a question of its trade");
     }
@@ -155,23 +163,34 @@ impl Own<'_> {
 type Question = for<'a> fn(&'a Mesh, Option<&'a RobotId>) -> Asking<'a>;
 type Asking<'a> = Pin<Box<dyn Future<Output = Result<(), Refusal>> + Send + 'a>>;
 
-/// A question for each functional service. It is answered by the nearest instance: one of this router's.
+/// A question for each service that answers for all robots. It is answered by the nearest instance: one of this router's.
 const QUESTIONS: &[(&str, Question)] = &[
     ("pathfinder", |mesh, robot| Box::pin(plan(mesh, robot))),
     ("pathdriver", |mesh, robot| Box::pin(drive(mesh, robot))),
+    ("map", |mesh, robot| Box::pin(map(mesh, robot))),
+    ("traffic", |mesh, robot| Box::pin(traffic(mesh, robot))),
 ];
 
 async fn plan(mesh: &Mesh, robot: Option<&RobotId>) -> Result<(), Refusal> {
-    let ask = PlanAsk { way: WayTask::parse("0,0 1,0")?, start: None };
+    let ask = PlanAsk { way: WayTask::parse("0,0 1,0")?, ..PlanAsk::default() };
     let plan = mesh.ask(&key::PLAN, robot, &ask, DEADLINE, Retry::Idempotent).await?;
     some(&plan.legs, "geometries for a way of a metre")
 }
 
 async fn drive(mesh: &Mesh, robot: Option<&RobotId>) -> Result<(), Refusal> {
     let leg = Leg { geometry: Geometry::Line { length: Metres(1.0) }, point: 0, speed: None };
-    let ask = DriveAsk { legs: vec![leg], speeds: None, robot: None };
+    let ask = DriveAsk { legs: vec![leg], speeds: None, robot: None, manner: None };
     let drive = mesh.ask(&key::DRIVE, robot, &ask, DEADLINE, Retry::Idempotent).await?;
     some(&drive.dwms, "movements for a line of a metre")
+}
+
+async fn map(mesh: &Mesh, robot: Option<&RobotId>) -> Result<(), Refusal> {
+    mesh.ask(&key::MAP, robot, &MapAsk::default(), DEADLINE, Retry::Idempotent).await.map(drop)
+}
+
+/// A fleet without robots is a good answer.
+async fn traffic(mesh: &Mesh, robot: Option<&RobotId>) -> Result<(), Refusal> {
+    mesh.ask(&key::TRAFFIC, robot, &TrafficAsk {}, DEADLINE, Retry::Idempotent).await.map(drop)
 }
 
 fn some<T>(list: &[T], what: &str) -> Result<(), Refusal> {
@@ -183,10 +202,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_planner_is_asked_a_question() {
+    fn whoever_answers_for_all_robots_is_asked_a_question() {
         for entry in catalog::CATALOG {
             let is_asked = QUESTIONS.iter().any(|(service, _)| *service == entry.name);
-            assert_eq!(is_asked, entry.scope == Scope::AllRobots, "{}", entry.name);
+            let answers = !(entry.wires)(entry.name).answers.is_empty();
+            assert_eq!(is_asked, entry.scope == Scope::AllRobots && answers, "{}", entry.name);
         }
     }
 }

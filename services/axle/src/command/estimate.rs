@@ -13,10 +13,22 @@ use crate::out::{data, note, table, usage};
 use crate::params::load;
 use anyhow::Context as _;
 use axle_navigator::{Method, Navigator, NavigatorParams, Position};
+use axle_schema::{Numbers, Pose, Seconds, Twist};
 use log::{Item, Log};
 use report::Report;
-use serde_json::json;
+use serde::Serialize;
 use std::io::{self, Write as _};
+
+/// A pose as it is printed.
+#[derive(Serialize)]
+struct Line {
+    covariance: Numbers<9>,
+    map_to_odom: Pose,
+    odom: Pose,
+    pose: Pose,
+    stamp: Seconds,
+    twist: Option<Twist>,
+}
 
 /// One method and what came of it.
 struct Run {
@@ -40,9 +52,10 @@ pub(super) fn estimate(args: &Estimate) -> anyhow::Result<()> {
         args.file
     );
     let methods = if args.compare { Method::ALL.to_vec() } else { vec![params.method] };
+    let keeps = args.svg.is_some() || !(args.report || args.compare);
     let runs = methods
         .into_iter()
-        .map(|method| run(&log, NavigatorParams { method, ..params.clone() }))
+        .map(|method| run(&log, NavigatorParams { method, ..params.clone() }, keeps))
         .collect::<anyhow::Result<Vec<_>>>()?;
     if let Some(file) = &args.svg {
         std::fs::write(file, svg(&args.file, &log, &runs)?)
@@ -54,15 +67,15 @@ pub(super) fn estimate(args: &Estimate) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Everything in the order of the log, which is that of arrival.
-fn run(log: &Log, params: NavigatorParams) -> anyhow::Result<Run> {
+/// Everything in the order of the log, which is that of arrival; poses are kept where somebody wants to see them.
+fn run(log: &Log, params: NavigatorParams, keeps: bool) -> anyhow::Result<Run> {
     let method = params.method;
     let mut navigator = Navigator::new(params).map_err(usage)?;
     let (mut poses, mut report) = (Vec::new(), Report::default());
     for item in &log.items {
         match item {
             Item::Measured(measurement) => {
-                if navigator.measure(measurement).is_some() {
+                if navigator.measure(measurement).is_some() && keeps {
                     poses.extend(navigator.position());
                 }
             }
@@ -90,15 +103,16 @@ fn print(args: &Estimate, runs: &[Run]) -> anyhow::Result<()> {
     }
     let mut out = io::BufWriter::new(io::stdout().lock());
     for position in runs.iter().flat_map(|run| &run.poses) {
-        let line = json!({
-            "stamp": position.odom.stamp,
-            "pose": position.map,
-            "twist": position.odom.twist,
-            "covariance": position.map_covariance,
-            "odom": position.odom.pose,
-            "map_to_odom": position.map_to_odom,
-        });
-        writeln!(out, "{line}")?;
+        let line = Line {
+            covariance: position.map_covariance,
+            map_to_odom: position.map_to_odom,
+            odom: position.odom.pose,
+            pose: position.map,
+            stamp: position.odom.stamp,
+            twist: position.odom.twist,
+        };
+        serde_json::to_writer(&mut out, &line)?;
+        writeln!(out)?;
     }
     Ok(out.flush()?)
 }

@@ -21,7 +21,7 @@ pub(super) async fn go(settings: &Settings, args: Go) -> anyhow::Result<()> {
     let mesh = settings.join("go").await?;
     let mut stop = crate::signal::stop()?;
     let words = mesh.inbox(&key::GO_PROGRESS.of(&robot), 64)?;
-    let ask = GoAsk { way: args.way, corrector: args.corrector };
+    let ask = GoAsk { way: args.way, corrector: args.corrector, confirm: args.confirm };
     let Accepted { task } = mesh.ask(&key::GO, Some(&robot), &ask, PATIENCE, Retry::Never).await?;
     let bar = Bar::new();
     let end = tokio::select! {
@@ -113,8 +113,9 @@ impl Bar {
             Phase::Running => "driving",
             _ => "over",
         };
+        let message = progress.waiting.clone().map_or_else(String::new, |why| format!("; it waits {why}"));
         let message = format!(
-            "{phase}: {}/{} way points, {:.2} m from the last, {:.1} s",
+            "{phase}: {}/{} way points, {:.2} m from the last, {:.1} s{message}",
             progress.reached, progress.points, progress.distance_left.0, progress.elapsed.0
         );
         self.set(progress.fraction, message);
@@ -124,6 +125,10 @@ impl Bar {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share from 0 to 1")]
         self.bar.set_position((share * 1000.0) as u64);
         self.bar.set_message(message);
+    }
+    /// Says words for people above it.
+    pub(crate) fn say(&self, words: &str) {
+        self.bar.suspend(|| note(words));
     }
     pub(crate) fn clear(&self) {
         self.bar.finish_and_clear();

@@ -1,33 +1,65 @@
 //! `axle plan "x,y x,y …"`: asks Pathfinder, and with `--drive` Pathdriver.
 
-use crate::chart;
+use super::go::Bar;
+use crate::chart::{self, WheelPoint};
 use crate::cli::Plan as Args;
-use crate::out::{data, note, table};
+use crate::out::{data, note, table, usage};
+use crate::params::load;
 use crate::path;
+use crate::run::map::read as read_map;
 use crate::settings::Settings;
 use anyhow::Context as _;
-use axle_mesh::Retry;
-use axle_schema::{Drive, DriveAsk, Geometry, Plan, PlanAsk, Pose, key};
+use axle_maps::Grid;
+use axle_mesh::{Clock, Mesh, Retry, random_bits};
+use axle_pathdriver::{Pathdriver, PathdriverParams};
+use axle_pathfinder::{PathfinderParams, Terrain};
+use axle_schema::contract::Functional as _;
+use axle_schema::task::Cancel;
+use axle_schema::{
+    Drive, DriveAsk, Geometry, Manner, Message as _, Metres, MetresPerSecond, Plan, PlanAsk, PlanProgress,
+    Pose, Refusal, RobotId, Seconds, TaskId, key,
+};
+use std::path::Path;
 use std::time::Duration;
 
 /// Planners have this long to answer.
 const PATIENCE: Duration = Duration::from_secs(3);
 
 pub(super) async fn plan(settings: &Settings, args: Args) -> anyhow::Result<()> {
-    let mesh = settings.join("plan").await?;
-    let robot = settings.robot.as_ref();
-    let ask = PlanAsk { way: args.way.clone(), start: args.from };
-    let plan = mesh.ask(&key::PLAN, robot, &ask, PATIENCE, Retry::Idempotent).await?;
-    let drive = if args.drive {
-        let ask = DriveAsk { legs: plan.legs.clone(), speeds: None, robot: None };
-        Some(mesh.ask(&key::DRIVE, robot, &ask, PATIENCE, Retry::Idempotent).await?)
-    } else {
-        None
+    let grid = args.map.as_deref().map(read_map).transpose()?;
+    let ask = PlanAsk {
+        way: args.way.clone(),
+        start: args.from,
+        strategy: args.strategy,
+        reorder: args.order,
+        map: grid.as_ref().map(Grid::to_data).transpose()?,
+        body: args.body.map(Metres),
+        deadline: args.deadline.map(Seconds),
+        ..PlanAsk::default()
     };
-    mesh.leave().await;
+    ask.check().map_err(usage)?;
+    let jump = args.jump.map(MetresPerSecond);
+    let manner = Manner { strategy: args.speeds, joints: args.joints, jump, offset: None };
+    let manner = args.drive.then_some(manner);
+    let (plan, drive) = if args.here {
+        here(args.params.as_deref(), &ask, manner)?
+    } else {
+        asked(settings, &ask, manner).await?
+    };
     if let Some(file) = &args.svg {
         let points: Vec<_> = args.way.points.iter().map(|point| (point.x.0, point.y.0)).collect();
-        let svg = chart::path_chart(&[chart::PathSeries::planned(path::of_plan(&plan))], &points)?;
+        let walls = grid.as_ref().map_or_else(Vec::new, |grid| axle_maps::areas(grid, chart::MAX_WALLS));
+        let path = chart::PathSeries::planned(path::of_plan(&plan));
+        let svg = if !walls.is_empty() {
+            // On a map the path must be seen before what stands around it.
+            let title = format!("{}: {:.2}", ask.strategy.unwrap_or_default(), plan.length);
+            chart::map_chart(&title, &[chart::PathSeries { ink: 1, ..path }], &points, &walls)?
+        } else if let Some(drive) = &drive {
+            let speeds = chart::Panel::of_runs("wheel speed (m/s)", &[&profile(drive)]);
+            chart::chart("The path, and the speeds of the wheels", &[path], &points, &[speeds])?
+        } else {
+            chart::path_chart(&[path], &points)?
+        };
         std::fs::write(file, svg).with_context(|| format!("write {}", file.display()))?;
         note(&format!("drawn: {}", file.display()));
     }
@@ -45,6 +77,85 @@ pub(super) async fn plan(settings: &Settings, args: Args) -> anyhow::Result<()> 
     drive.map_or(Ok(()), |drive| print_drive(&drive))
 }
 
+/// Asks the planners of the mesh.
+async fn asked(
+    settings: &Settings,
+    ask: &PlanAsk,
+    manner: Option<Manner>,
+) -> anyhow::Result<(Plan, Option<Drive>)> {
+    let mesh = settings.join("plan").await?;
+    let robot = settings.robot.as_ref();
+    // Pathfinder keeps its deadline; its answer still has to come.
+    let patience = PATIENCE + Duration::from_secs_f64(ask.deadline.map_or(0.0, |deadline| deadline.0));
+    let plan = search(&mesh, robot, ask, patience).await?;
+    let drive = if manner.is_some() {
+        let ask = DriveAsk { legs: plan.legs.clone(), manner, ..DriveAsk::default() };
+        Some(mesh.ask(&key::DRIVE, robot, &ask, PATIENCE, Retry::Idempotent).await?)
+    } else {
+        None
+    };
+    mesh.leave().await;
+    Ok((plan, drive))
+}
+
+/// Asks Pathfinder, shows how far a long search is, and has it ended when the user wants no more of it.
+async fn search(
+    mesh: &Mesh,
+    robot: Option<&RobotId>,
+    ask: &PlanAsk,
+    patience: Duration,
+) -> anyhow::Result<Plan> {
+    let id = TaskId::from_random(random_bits());
+    let ask = PlanAsk { id: Some(id), ..ask.clone() };
+    let mut stop = crate::signal::stop()?;
+    let words = mesh.inbox(&key::PLAN_PROGRESS.of_every_robot(), 16)?;
+    let cancel = robot.map_or_else(|| key::PLAN_CANCEL.of_all_robots(), |robot| key::PLAN_CANCEL.of(robot));
+    let bar = Bar::new();
+    let mut question = std::pin::pin!(mesh.ask(&key::PLAN, robot, &ask, patience, Retry::Idempotent));
+    let mut is_cancelled = false;
+    let answer = loop {
+        tokio::select! {
+            answer = &mut question => break answer,
+            heard = words.next() => {
+                let PlanProgress { id: whose, fraction, elapsed } = heard.message;
+                if whose == id {
+                    bar.set(fraction, format!("searching, {elapsed:.1}"));
+                }
+            }
+            () = stop.wait(), if !is_cancelled => {
+                is_cancelled = true;
+                note("cancelling …");
+                mesh.put_once(&cancel, &Cancel { id })?;
+            }
+        }
+    };
+    bar.clear();
+    Ok(answer?)
+}
+
+/// Plans in this process.
+fn here(
+    params: Option<&Path>,
+    ask: &PlanAsk,
+    manner: Option<Manner>,
+) -> anyhow::Result<(Plan, Option<Drive>)> {
+    let params: PathfinderParams = load(params)?;
+    let clock = Clock::start();
+    let deadline = ask.deadline.unwrap_or(params.deadline);
+    let mut watch = |_: f64| {
+        if clock.now() <= deadline {
+            return Ok(());
+        }
+        Err(Refusal::TimedOut { what: "pathfinder".into(), seconds: deadline.0 })
+    };
+    let unknown = params.unknown();
+    let terrain = ask.map.as_ref().map(|map| Terrain::watched(map, unknown, &mut watch)).transpose()?;
+    let plan = axle_pathfinder::plan(&params, ask, terrain.as_ref(), &mut watch)?;
+    let ask = DriveAsk { legs: plan.legs.clone(), robot: ask.robot, manner, ..DriveAsk::default() };
+    let drive = manner.map(|_| Pathdriver::answer(&PathdriverParams::default(), &ask)).transpose()?;
+    Ok((plan, drive))
+}
+
 fn print_plan(plan: &Plan) -> anyhow::Result<()> {
     if plan.legs.is_empty() {
         note("nothing to drive: the robot is there already");
@@ -57,7 +168,14 @@ fn print_plan(plan: &Plan) -> anyhow::Result<()> {
         vec![(index + 1).to_string(), what.into(), how, (leg.point + 1).to_string(), at(pose)]
     });
     table(&["leg", "geometry", "size", "to point", "ends at x, y, heading"], rows)?;
-    data(&format!("length {:.3}", plan.length))?;
+    let mut facts = vec![format!("length {:.3}", plan.length)];
+    facts.extend(plan.time.map(|time| format!("time about {time:.1}")));
+    facts.extend(plan.clearance.map(|clearance| format!("clearance {clearance:.3}")));
+    if !plan.order.is_empty() {
+        let order: Vec<String> = plan.order.iter().map(|point| (point + 1).to_string()).collect();
+        facts.push(format!("order {}", order.join(" ")));
+    }
+    data(&facts.join(", "))?;
     Ok(())
 }
 
@@ -82,6 +200,19 @@ fn at(pose: Pose) -> String {
     )
 }
 
+/// The speeds of the wheels over time: both ends of every movement.
+fn profile(drive: &Drive) -> Vec<WheelPoint> {
+    let mut time = 0.0;
+    let mut points = Vec::with_capacity(2 * drive.dwms.len());
+    for dwm in &drive.dwms {
+        for (speeds, after) in [(dwm.start(), 0.0), (dwm.end(), dwm.duration().0)] {
+            time += after;
+            points.push(WheelPoint { time, left: speeds.left.0, right: speeds.right.0 });
+        }
+    }
+    points
+}
+
 fn print_drive(drive: &Drive) -> anyhow::Result<()> {
     let legs = drive
         .counts
@@ -100,5 +231,11 @@ fn print_drive(drive: &Drive) -> anyhow::Result<()> {
     });
     table(&["movement", "leg", "from left, right m/s", "to left, right m/s", "duration"], rows)?;
     data(&format!("duration {:.3}", drive.duration))?;
+    if drive.jump > MetresPerSecond::ZERO {
+        data(&format!("jump {:.3}", drive.jump))?;
+    }
+    if let Some(offset) = drive.offset {
+        data(&format!("offset {:.4}", offset))?;
+    }
     Ok(())
 }

@@ -1,7 +1,9 @@
 //! `axle router`: the Zenoh router of this computer.
 
 use crate::cli::Router;
+use crate::keys::{ACCESS_FILE, Role};
 use crate::out::usage;
+use crate::settings::Settings;
 use anyhow::Context as _;
 use axle_router::{Router as Process, RouterFault, RouterSettings};
 use std::os::unix::process::CommandExt as _;
@@ -11,7 +13,7 @@ use std::os::unix::process::CommandExt as _;
 /// environment only.
 const THREADS: (&str, &str) = ("ZENOH_RUNTIME", "(rx: (worker_threads: 64))");
 
-pub(super) async fn router(args: Router) -> anyhow::Result<()> {
+pub(super) async fn router(settings: &Settings, args: Router) -> anyhow::Result<()> {
     if std::env::var_os(THREADS.0).is_none() {
         // The same process begins anew, with the variable.
         let fault = std::process::Command::new(std::env::current_exe().context("find the axle program")?)
@@ -21,9 +23,17 @@ pub(super) async fn router(args: Router) -> anyhow::Result<()> {
         return Err(fault).context("begin anew with more threads");
     }
     let mut stop = crate::signal::stop()?;
-    let settings =
-        RouterSettings { listen: args.listen, connect: args.link, insecure_lan: args.insecure_lan };
-    if settings.insecure_lan {
+    let link = settings.link()?;
+    let access = link.identity.as_ref().map(|identity| rules(&args, identity)).transpose()?;
+    let own = |endpoints: &[String]| endpoints.iter().map(|endpoint| settings.endpoint(endpoint)).collect();
+    let settings = RouterSettings {
+        listen: own(&args.listen),
+        connect: own(&args.link),
+        insecure_lan: args.insecure_lan,
+        link,
+        access,
+    };
+    if settings.insecure_lan && settings.link.identity.is_none() {
         tracing::warn!(
             "listening without encryption or authentication: whoever reaches this port can drive the robots"
         );
@@ -32,12 +42,31 @@ pub(super) async fn router(args: Router) -> anyhow::Result<()> {
     let router =
         tokio::task::spawn_blocking(move || Process::start(&settings)).await?.map_err(
             |fault| match fault {
-                RouterFault::Endpoint(_) | RouterFault::Exposed { .. } => usage(fault),
+                RouterFault::Endpoint(_) | RouterFault::Exposed { .. } | RouterFault::NoRules => usage(fault),
                 other => other.into(),
             },
         )?;
     tracing::info!("the router listens on {listen}");
+    let _ready = crate::notify::ready(stop.clone());
     stop.wait().await;
     tokio::task::spawn_blocking(move || router.stop()).await?;
     Ok(())
+}
+
+/// The access rules that stand in a file of their own, or beside the certificate.
+fn rules(args: &Router, identity: &axle_mesh::Identity) -> anyhow::Result<String> {
+    if identity.certificate.role != Role::Router.word() {
+        return Err(usage(format!(
+            "--identity: the certificate of {} is a {}'s; a router needs its own, `axle keys issue router@HOST`",
+            identity.name(),
+            identity.certificate.role
+        )));
+    }
+    let path = args.access.clone().unwrap_or_else(|| identity.directory().join(ACCESS_FILE));
+    std::fs::read_to_string(&path).map_err(|fault| {
+        usage(format!(
+            "cannot read the access rules {}: {fault}; write them with `axle keys issue --topology FILE`",
+            path.display()
+        ))
+    })
 }

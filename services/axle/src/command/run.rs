@@ -30,5 +30,11 @@ pub(super) async fn run(settings: &Settings, args: Run) -> anyhow::Result<()> {
     }
     let entry = catalog::find(&args.service).ok_or_else(|| unknown_service(&args.service))?;
     let inputs = inputs(entry, &args.input)?;
-    run::run(entry, settings, args.params, inputs).await
+    if (args.board.is_some() || args.port.is_some()) && !catalog::takes_board(entry.name) {
+        return Err(usage(format!(
+            "{} has no board: --board and --port are for robot and emulator",
+            entry.name
+        )));
+    }
+    run::run(entry, settings, args.params, inputs, (args.board, args.port)).await
 }

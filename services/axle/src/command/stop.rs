@@ -4,7 +4,7 @@ use crate::cli::Stop;
 use crate::out::{data, note};
 use crate::settings::Settings;
 use axle_mesh::{Inbox, Mesh, Retry, random_bits};
-use axle_schema::command::{AllStop, Done, Enable, GateState};
+use axle_schema::command::{AllStop, Class, Done, Enable, GateState};
 use axle_schema::{RobotId, StopId, key};
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -51,10 +51,11 @@ pub(super) async fn stop(settings: &Settings, args: &Stop) -> anyhow::Result<()>
             }
         }
     }
+    let denied = mesh.unless_denied();
     mesh.leave().await;
     anyhow::ensure!(
         silent.is_empty(),
-        "{} did not acknowledge the stop within 2 s and may still move; is the robot or emulator up?",
+        "{} did not acknowledge the stop within 2 s and may still move; is the robot or emulator up?{denied}",
         silent.join(", ")
     );
     Ok(())
@@ -64,6 +65,12 @@ pub(super) async fn stop(settings: &Settings, args: &Stop) -> anyhow::Result<()>
 struct Receipt {
     state: Option<GateState>,
     took: Duration,
+}
+
+/// Stops one robot; says whether its gate has acknowledged it.
+pub(super) async fn stop_now(mesh: &Mesh, robot: &RobotId) -> anyhow::Result<bool> {
+    let order = AllStop { id: StopId::from_random(random_bits()), by: mesh.name() };
+    Ok(stop_one(mesh, robot, &order).await?.state.is_some())
 }
 
 async fn stop_one(mesh: &Mesh, robot: &RobotId, order: &AllStop) -> anyhow::Result<Receipt> {
@@ -103,16 +110,28 @@ async fn every_robot(mesh: &Mesh) -> anyhow::Result<Vec<RobotId>> {
 pub(super) async fn enable(settings: &Settings, json: bool) -> anyhow::Result<()> {
     let robot = settings.one_robot()?;
     let mesh = settings.join("enable").await?;
-    let state = newest_state(&mesh, &robot).await?;
-    let ask = Enable { stop: state.stop, boot: state.boot, echo: state.tick, by: mesh.name() };
-    let Done {} =
-        mesh.ask(&key::ENABLE, Some(&robot), &ask, Duration::from_secs(2), Retry::Idempotent).await?;
+    enable_now(&mesh, &robot).await?;
     if json {
         data(&serde_json::json!({ "robot": robot, "enabled": true }).to_string())?;
     } else {
         note(&format!("{robot} may move"));
     }
     mesh.leave().await;
+    Ok(())
+}
+
+/// Allows the wheels of one robot to move again.
+pub(super) async fn enable_now(mesh: &Mesh, robot: &RobotId) -> anyhow::Result<()> {
+    let state = newest_state(mesh, robot).await?;
+    let ask = Enable {
+        stop: state.stop,
+        boot: state.boot,
+        echo: state.tick,
+        by: mesh.name(),
+        class: Class::Manual,
+    };
+    let Done {} =
+        mesh.ask(&key::ENABLE, Some(robot), &ask, Duration::from_secs(2), Retry::Idempotent).await?;
     Ok(())
 }
 

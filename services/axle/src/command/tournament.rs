@@ -11,7 +11,7 @@ use crate::cli::Tournament as Args;
 use crate::out::{self, is_watched, note, usage};
 use anyhow::Context as _;
 use axle_schema::Refusal;
-use axle_sim::{COURSES, Course, Run, SCENARIOS, Scenario, Seat, Tournament, seats};
+use axle_sim::{COURSES, Course, Run, SCENARIOS, Scenario, Seat, TRIALS, Tournament, seats};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::num::NonZero;
 use std::sync::OnceLock;
@@ -132,7 +132,9 @@ fn bar(jobs: usize, what: &'static str) -> ProgressBar {
 fn list() -> anyhow::Result<()> {
     let course = |course: &Course| vec!["course".into(), course.name.into(), course.about.into()];
     let scenario = |scenario: &Scenario| vec!["scenario".into(), scenario.name.into(), scenario.about.into()];
-    let rows = COURSES.iter().map(course).chain(SCENARIOS.iter().map(scenario));
+    let trial = |trial: &Scenario| vec!["trial of --tune".into(), trial.name.into(), trial.about.into()];
+    let rows =
+        COURSES.iter().map(course).chain(SCENARIOS.iter().map(scenario)).chain(TRIALS.iter().map(trial));
     Ok(out::table(&["kind", "name", "what it is"], rows)?)
 }
 

@@ -7,7 +7,7 @@
 use super::Context;
 use super::latch::Latch;
 use axle_gate::{COMMANDS_PER_BEAT, Gate, Headline};
-use axle_mesh::{Counters, Inbox, Mesh, Publisher, Server};
+use axle_mesh::{Alarm, Counters, Inbox, Mesh, Publisher, Server};
 use axle_schema::codec::decode_as;
 use axle_schema::command::{AllStop, Command, Done, Enable, GateState, Lease, LeaseAsk, Motion, Release};
 use axle_schema::meta::Cause;
@@ -27,6 +27,8 @@ pub(crate) trait Wheels: Send + 'static {
     fn hear(&mut self, _now: Seconds) -> Result<(), Refusal> {
         Ok(())
     }
+    /// Hears what is asked about the wheels themselves; the gate says whose they are.
+    fn tune(&mut self, _now: Seconds, _gate: &Gate) {}
     /// Takes the setpoint of the gate for this instant.
     fn advance(&mut self, now: Seconds, speeds: Sides<MetresPerSecond>);
     /// Says what is measured, naming the command that caused it.
@@ -45,7 +47,9 @@ pub(crate) async fn own<W: Wheels>(
     let mut board = Board::new(&mesh, robot, gate, latch, wheels)?;
     let stopping = Arc::new(AtomicBool::new(false));
     let is_stopping = Arc::clone(&stopping);
-    let thread = mesh.beat_on_own_thread("gate", beat, move |now| {
+    let alarm = Alarm::default();
+    board.stops.rings(alarm.clone());
+    let thread = mesh.beat_on_own_thread("gate", beat, alarm, move |now| {
         let is_stopping = is_stopping.load(Relaxed);
         if is_stopping {
             board.gate.disable(now);
@@ -145,6 +149,7 @@ impl<W: Wheels> Board<W> {
             let answer = asked.question().and_then(|enable| self.gate.enable(now, &enable));
             asked.reply(answer.map(|()| Done {}));
         }
+        self.wheels.tune(now, &self.gate);
         self.hear_commands(now);
         let speeds = self.gate.beat(now);
         self.wheels.advance(now, speeds);
@@ -171,19 +176,19 @@ impl<W: Wheels> Board<W> {
         let unread = self.stops.oversized();
         if unread > self.unread_stops {
             self.unread_stops = unread;
-            tracing::warn!("an AllStop that is too large to be read disables the drive");
             self.gate.disable(now);
+            tracing::warn!("an AllStop that is too large to be read disables the drive");
         }
         while let Some(raw) = self.stops.take_raw() {
             match decode_as::<AllStop>(&raw.encoding, &raw.payload) {
                 Ok(stop) => {
-                    tracing::warn!(stop = %stop.id, "AllStop by {}", stop.by);
                     self.gate.stop(now, stop.id);
+                    tracing::warn!(stop = %stop.id, "AllStop by {}", stop.by);
                 }
                 // Whoever speaks on this key wants the wheels to stand, even if the words are wrong.
                 Err(refusal) => {
-                    tracing::warn!("an AllStop that cannot be read disables the drive: {refusal}");
                     self.gate.disable(now);
+                    tracing::warn!("an AllStop that cannot be read disables the drive: {refusal}");
                 }
             }
         }

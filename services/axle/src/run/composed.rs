@@ -39,9 +39,9 @@ pub(crate) struct ComposedParams {
     /// Power for each metre of accumulated error, 0 to 100.
     ki: f64,
     /// The motor services.
-    motors: Sides<String>,
+    pub(crate) motors: Sides<String>,
     /// The encoder services.
-    encoders: Sides<String>,
+    pub(crate) encoders: Sides<String>,
     /// The body of the robot.
     robot: Drivetrain,
     /// The gate.

@@ -1,4 +1,8 @@
 //! Pilot as a process: takes a task, asks the planners, hands the plan to a corrector, says how far it is.
+//!
+//! A robot of a fleet, and a task with loading points, is driven stage by stage: that is in `trip`.
+
+mod trip;
 
 use super::Context;
 use crate::catalog::{self, Takes};
@@ -9,14 +13,17 @@ use axle_schema::command::Done;
 use axle_schema::key;
 use axle_schema::meta::Cause;
 use axle_schema::task::{Accepted, Cancel, CorrectorProgress, GoAsk, Phase, PilotProgress, Task};
+use axle_schema::traffic::{Clearance, Confirm};
 use axle_schema::{
-    Drive, DriveAsk, NavigatorData, Plan, PlanAsk, Pose, Refusal, RobotId, Seconds, TaskId, WayTask,
+    Drive, DriveAsk, NavigatorData, NavigatorEvent, Plan, PlanAsk, Pose, Refusal, RobotId, Seconds, TaskId,
+    WayTask,
 };
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
+use trip::Trip;
 
 /// Poses that may wait for the next beat.
 const POSES: usize = 64;
@@ -34,16 +41,20 @@ pub(crate) async fn run(mut context: Context) -> anyhow::Result<()> {
     let mesh = &context.mesh;
     let goes = mesh.server::<GoAsk, Accepted>(&key::GO.of(Some(&robot)))?;
     let cancels = mesh.server::<Cancel, Done>(&key::GO_CANCEL.of(Some(&robot)))?;
+    let confirms = mesh.server::<Confirm, Done>(&key::CONFIRM.of(Some(&robot)))?;
     let poses = mesh.inbox(&key::POSE.of(&robot), POSES)?;
-    let (mut pilot, mut words, mut plans) = Pilot::new(mesh.clone(), robot, params)?;
+    let events = mesh.inbox(&key::NAVIGATOR_EVENT.of(&robot), 16)?;
+    let (mut pilot, mut words, mut answers) = Pilot::new(mesh.clone(), robot, params)?;
     let _visible = context.ready()?;
     let mut beat = mesh.beat(PACE);
     loop {
         let event = tokio::select! {
             asked = goes.next() => Event::Go(asked),
             asked = cancels.next() => Event::Cancel(asked),
+            heard = events.next() => Event::Noticed(heard.message),
             Some(said) = words.recv() => Event::Said(said),
-            Some((task, planned)) = plans.recv() => Event::Planned(task, planned),
+            asked = confirms.next() => Event::Confirm(asked),
+            Some(event) = answers.recv() => event,
             _ = beat.next() => Event::Beat,
             () = context.stop.wait() => Event::Stop,
         };
@@ -61,8 +72,14 @@ pub(crate) async fn run(mut context: Context) -> anyhow::Result<()> {
 enum Event {
     Go(Asked<GoAsk, Accepted>),
     Cancel(Asked<Cancel, Done>),
+    Noticed(NavigatorEvent),
     Said(CorrectorProgress),
+    Confirm(Asked<Confirm, Done>),
     Planned(TaskId, Result<Planned, Refusal>),
+    /// The stage of a trip is planned.
+    Staged(TaskId, Result<Planned, Refusal>),
+    /// Traffic has answered.
+    Cleared(TaskId, Result<Clearance, Refusal>),
     Beat,
     Stop,
 }
@@ -86,6 +103,10 @@ pub(crate) fn check(file: Option<&Path>) -> anyhow::Result<()> {
 fn unknown_corrector(name: &str) -> Refusal {
     let got = name.chars().take(64).collect();
     Refusal::Unknown { what: "corrector".into(), got, known: catalog::corrector_names() }
+}
+
+fn stands(seen: &NavigatorData) -> bool {
+    seen.twist.is_none_or(|twist| twist.v.0.abs() <= REST && twist.omega.0.abs() <= REST)
 }
 
 /// The lines to one corrector.
@@ -143,22 +164,31 @@ struct Pilot {
     /// The task that ended last, and its corrector.
     dismissed: Option<(String, TaskId)>,
     planning: Option<JoinHandle<()>>,
-    planned: mpsc::Sender<(TaskId, Result<Planned, Refusal>)>,
+    /// Where planners and Traffic answer.
+    answers: mpsc::Sender<Event>,
+    /// The loading points of the task.
+    confirm: Vec<u32>,
+    /// The task in stages, if it is driven so.
+    trip: Option<Trip>,
+    /// Where Traffic was told that the robot stands without a task.
+    parked: Option<(TaskId, Pose)>,
+    /// When Traffic is asked again.
+    claim_due: Seconds,
     /// The order that the corrector has not answered yet.
     order: Option<Order>,
     /// The latest of way, plan and movements of the task.
     cause: Option<Cause>,
 }
 
-/// What correctors say, and what planners answer.
+/// What correctors say, and what planners and Traffic answer.
 type Words = mpsc::Receiver<CorrectorProgress>;
-type Plans = mpsc::Receiver<(TaskId, Result<Planned, Refusal>)>;
+type Answers = mpsc::Receiver<Event>;
 
 impl Pilot {
-    fn new(mesh: Mesh, robot: RobotId, params: PilotParams) -> anyhow::Result<(Self, Words, Plans)> {
+    fn new(mesh: Mesh, robot: RobotId, params: PilotParams) -> anyhow::Result<(Self, Words, Answers)> {
         let mut lines = BTreeMap::new();
         let (word, words) = mpsc::channel(32);
-        let (planned, plans) = mpsc::channel(1);
+        let (answer, answers) = mpsc::channel(4);
         for entry in catalog::CATALOG {
             let Some(takes) = entry.takes else { continue };
             let line = Line {
@@ -184,11 +214,15 @@ impl Pilot {
             resting: None,
             dismissed: None,
             planning: None,
-            planned,
+            answers: answer,
+            confirm: Vec::new(),
+            trip: None,
+            parked: None,
+            claim_due: Seconds::ZERO,
             order: None,
             cause: None,
         };
-        Ok((pilot, words, plans))
+        Ok((pilot, words, answers))
     }
 
     /// Does what an event asks for; `false` when the pilot is to stop.
@@ -202,8 +236,19 @@ impl Pilot {
                 let answer = asked.question().and_then(|cancel| self.cancel(cancel.id, now));
                 asked.reply(answer);
             }
-            Event::Said(said) => self.hear(&said, now),
+            Event::Confirm(asked) => {
+                let answer = asked.question().and_then(|confirm| self.confirm(&confirm));
+                asked.reply(answer);
+            }
+            // Nobody knows any more where the robot is on its way, or whether its wheels do what they are told.
+            Event::Noticed(noticed) if noticed.stop => {
+                self.end(Phase::Failed(Refusal::Failed { why: noticed.why }), now);
+            }
+            Event::Noticed(_) => {}
+            Event::Said(said) => self.hear(said, now),
             Event::Planned(task, planned) => self.drive(task, planned, now),
+            Event::Staged(stage, planned) => self.drive_stage(stage, planned, now),
+            Event::Cleared(task, said) => self.hear_traffic(task, &said),
             Event::Beat => self.beat(now),
             Event::Stop => {
                 self.end(Phase::Failed(Refusal::Failed { why: "the pilot was stopped".into() }), now);
@@ -225,6 +270,7 @@ impl Pilot {
             return Err(Refusal::unavailable("navigator", hint));
         };
         self.end(Phase::Replaced, now);
+        self.confirm = ask.confirm;
         let id = TaskId::from_random(random_bits());
         let way = Task { id, plan: ask.way.clone() };
         self.cause = self.say("the task", self.ways.put(&way, None));
@@ -242,8 +288,7 @@ impl Pilot {
         else {
             return;
         };
-        let stands = seen.twist.is_none_or(|twist| twist.v.0.abs() <= REST && twist.omega.0.abs() <= REST);
-        if stands {
+        if stands(&seen) {
             self.planning = Some(self.ask_planners(journey.task(), way.clone(), seen.pose));
             self.resting = None;
         } else if now - *since > BRAKING {
@@ -260,18 +305,24 @@ impl Pilot {
     /// Asks Pathfinder and Pathdriver beside the loop, which stays able to hear and to cancel.
     fn ask_planners(&self, task: TaskId, way: WayTask, start: Pose) -> JoinHandle<()> {
         let (mesh, robot, params) = (self.mesh.clone(), self.robot.clone(), self.params.clone());
-        let planned = self.planned.clone();
+        let answers = self.answers.clone();
         let deadline = Duration::from_secs_f64(params.deadline.0);
         tokio::spawn(async move {
             let plans = async {
-                let ask = PlanAsk { way, start: Some(start) };
+                let (drivetrain, body) = (Some(params.robot), Some(params.radius));
+                let ask = PlanAsk { way, start: Some(start), robot: drivetrain, body, ..PlanAsk::default() };
                 let plan = mesh.ask(&key::PLAN, Some(&robot), &ask, deadline, Retry::Idempotent).await?;
-                let ask = DriveAsk { legs: plan.legs.clone(), speeds: None, robot: Some(params.robot) };
+                let ask = DriveAsk {
+                    legs: plan.legs.clone(),
+                    speeds: None,
+                    robot: Some(params.robot),
+                    manner: None,
+                };
                 let drive = mesh.ask(&key::DRIVE, Some(&robot), &ask, deadline, Retry::Idempotent).await?;
                 Ok(Planned { plan, drive })
             };
             // The pilot that no longer listens has stopped.
-            drop(planned.send((task, plans.await)).await);
+            drop(answers.send(Event::Planned(task, plans.await)).await);
         })
     }
 
@@ -293,13 +344,17 @@ impl Pilot {
         }
     }
 
-    fn hear(&mut self, said: &CorrectorProgress, now: Seconds) {
-        let Some(journey) = &mut self.journey else { return };
-        if said.task == journey.task() {
+    fn hear(&mut self, said: CorrectorProgress, now: Seconds) {
+        if self.order.as_ref().is_some_and(|order| order.drive.id == said.task) {
             self.order = None;
         }
+        let Some(said) = self.of_task(said, now) else { return };
+        let Some(journey) = &mut self.journey else { return };
         let before = journey.phase().clone();
-        journey.hear(&self.params, said, now);
+        journey.hear(&self.params, &said, now);
+        if journey.phase().is_over() {
+            self.trip = None;
+        }
         if *journey.phase() != before {
             self.say_progress(now);
         }
@@ -311,6 +366,9 @@ impl Pilot {
         match planned {
             Ok(Planned { plan, drive }) => {
                 journey.drive(now);
+                if self.params.traffic || !self.confirm.is_empty() {
+                    return self.set_out(id, plan, now);
+                }
                 // Each names the one before it: the way caused the plan, the plan the movements, these the order.
                 let order = Order { plan: Task { id, plan }, drive: Task { id, plan: drive } };
                 self.cause = self.say("the plan", self.plans.put(&order.plan, self.cause));
@@ -334,6 +392,7 @@ impl Pilot {
     fn beat(&mut self, now: Seconds) {
         self.plan_at_rest(now);
         self.repeat_order();
+        self.see_to_trip(now);
         let Some(journey) = &mut self.journey else { return };
         if journey.phase().is_over() {
             return;
@@ -363,9 +422,10 @@ impl Pilot {
             planning.abort();
         }
         let Some(journey) = &self.journey else { return };
-        self.dismissed = Some((journey.corrector().to_owned(), journey.task()));
+        let driven = self.trip.take().and_then(|trip| trip.stage).unwrap_or(journey.task());
+        self.dismissed = Some((journey.corrector().to_owned(), driven));
         if let Some(line) = self.lines.get(journey.corrector()) {
-            self.say("the cancellation", line.cancels.put(&Cancel { id: journey.task() }, None));
+            self.say("the cancellation", line.cancels.put(&Cancel { id: driven }, None));
         }
     }
 

@@ -5,15 +5,17 @@
 
 use super::Context;
 use crate::params::load;
+use crate::signal::Stop;
 use anyhow::Context as _;
-use axle_mesh::Tap;
 use axle_mesh::clock::wall_nanoseconds;
-use axle_recorder::{RecordError, Recorder, RecorderParams, Sample, Totals};
+use axle_mesh::{Alarm, Mesh, Raw, Tap};
+use axle_recorder::{RecordError, RecorderParams, Sample, Series, Totals};
 use axle_schema::{Seconds, key};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::oneshot;
 
 /// Samples that may wait for the disk.
@@ -25,46 +27,93 @@ const PACE: Seconds = Seconds(0.05);
 pub(crate) async fn run(mut context: Context) -> anyhow::Result<()> {
     let params: RecorderParams = load(context.params.as_deref())?;
     let robot = context.one_robot()?;
-    let path = file(&params, robot.as_str());
-    if let Some(directory) = path.parent() {
-        std::fs::create_dir_all(directory)?;
-    }
-    let about = BTreeMap::from([
-        ("axle".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
-        ("robot".to_owned(), robot.to_string()),
-        ("process".to_owned(), context.mesh.name()),
-    ]);
-    let recorder = Recorder::create(&path, &about, &params, wall_nanoseconds())?;
-    let tap = context.mesh.tap(&key::everything(Some(&robot)), WAITING)?;
-    let (ended, mut outcome) = oneshot::channel();
-    let stopping = Arc::new(AtomicBool::new(false));
-    let mut desk =
-        Desk { recorder: Some(recorder), tap, lost: 0, ended: Some(ended), stopping: Arc::clone(&stopping) };
-    // A thread of its own may wait for the disk.
-    let writing = context.mesh.beat_on_own_thread("recorder", PACE, move |_| desk.beat())?;
+    let recording =
+        Recording::begin(&context.mesh, &[key::everything(Some(&robot))], robot.as_str(), params)?;
     let _visible = context.ready()?;
-    tracing::info!("recording to {}", path.display());
-    let early = tokio::select! {
-        outcome = &mut outcome => Some(outcome),
-        () = context.stop.wait() => None,
-    };
-    stopping.store(true, Relaxed);
-    let outcome = match early {
-        Some(outcome) => outcome,
-        None => outcome.await,
-    };
-    tokio::task::spawn_blocking(move || drop(writing.join())).await?;
-    let totals = outcome.context("the writer of the recording broke down")??;
+    tracing::info!("recording to {}", recording.path.display());
+    let totals = recording.end(&mut context.stop).await?;
     tracing::info!("recorded {} samples, {} lost", totals.samples, totals.lost);
     Ok(())
 }
 
-/// Where samples become a file.
-struct Desk {
-    recorder: Option<Recorder>,
+/// A recording of some keys that is being made.
+pub(crate) struct Recording {
+    /// Its first file.
+    pub(crate) path: PathBuf,
+    outcome: oneshot::Receiver<Result<Totals, RecordError>>,
+    stopping: Arc<AtomicBool>,
+    writing: std::thread::JoinHandle<()>,
+}
+
+impl Recording {
+    /// Begins a recording of these keys, named after `who`.
+    ///
+    /// # Errors
+    /// When the file cannot be made, or a key expression is none.
+    pub(crate) fn begin(
+        mesh: &Mesh,
+        keys: &[String],
+        who: &str,
+        params: RecorderParams,
+    ) -> anyhow::Result<Self> {
+        // Where files may not grow beyond a limit, the system would end the process; so a write fails instead, as on a
+        // full disk.
+        let limit = SignalKind::from_raw(nix::sys::signal::Signal::SIGXFSZ as i32);
+        drop(signal(limit).context("hear of the limit of a file's size")?);
+        let path = file(&params, who);
+        if let Some(directory) = path.parent() {
+            std::fs::create_dir_all(directory)?;
+        }
+        let about = BTreeMap::from([
+            ("axle".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+            ("robot".to_owned(), who.to_owned()),
+            ("process".to_owned(), mesh.name()),
+        ]);
+        let taps = keys
+            .iter()
+            .map(|key| Ok(Ear { key: key.clone(), tap: mesh.tap(key, WAITING)?, lost: 0 }))
+            .collect::<Result<_, axle_mesh::Fault>>()?;
+        let series = Series::create(&path, about, params, wall_nanoseconds())?;
+        let (ended, outcome) = oneshot::channel();
+        let stopping = Arc::new(AtomicBool::new(false));
+        let mut desk =
+            Desk { series: Some(series), taps, ended: Some(ended), stopping: Arc::clone(&stopping) };
+        // A thread of its own may wait for the disk.
+        let writing = mesh.beat_on_own_thread("recorder", PACE, Alarm::default(), move |_| desk.beat())?;
+        Ok(Self { path, outcome, stopping, writing })
+    }
+
+    /// Goes on until it is told to stop, or fails; closes the file.
+    ///
+    /// # Errors
+    /// Why the recording ended early: a full disk, its limit.
+    pub(crate) async fn end(mut self, stop: &mut Stop) -> anyhow::Result<Totals> {
+        let early = tokio::select! {
+            outcome = &mut self.outcome => Some(outcome),
+            () = stop.wait() => None,
+        };
+        self.stopping.store(true, Relaxed);
+        let outcome = match early {
+            Some(outcome) => outcome,
+            None => self.outcome.await,
+        };
+        tokio::task::spawn_blocking(move || drop(self.writing.join())).await?;
+        Ok(outcome.context("the writer of the recording broke down")??)
+    }
+}
+
+/// A key expression that is heard.
+struct Ear {
+    key: String,
     tap: Tap,
     /// Losses that are in the recording already.
     lost: u64,
+}
+
+/// Where samples become a file.
+struct Desk {
+    series: Option<Series>,
+    taps: Vec<Ear>,
     ended: Option<oneshot::Sender<Result<Totals, RecordError>>>,
     stopping: Arc<AtomicBool>,
 }
@@ -77,9 +126,9 @@ impl Desk {
         if written.is_ok() && !is_last {
             return true;
         }
-        let Some(recorder) = self.recorder.take() else { return false };
+        let Some(series) = self.series.take() else { return false };
         // What was written before a full disk is closed as well as can be; the reason is told all the same.
-        let finished = recorder.finish();
+        let finished = series.finish();
         let outcome = written.and(finished);
         if let Some(ended) = self.ended.take() {
             // Nobody waits any more when the process is ending in a hurry.
@@ -89,16 +138,22 @@ impl Desk {
     }
 
     fn write(&mut self) -> Result<(), RecordError> {
-        let Some(recorder) = &mut self.recorder else { return Err(RecordError::Ended) };
+        let Some(series) = &mut self.series else { return Err(RecordError::Ended) };
         let now = wall_nanoseconds();
-        let dropped = self.tap.dropped();
-        if dropped > self.lost {
-            recorder.gap("**", dropped - self.lost, now)?;
-            self.lost = dropped;
+        for Ear { key, tap, lost } in &mut self.taps {
+            let dropped = tap.dropped();
+            if dropped > *lost {
+                series.gap(key, dropped - *lost, now)?;
+                *lost = dropped;
+            }
         }
         // What arrives meanwhile waits for the next beat, so that a flood cannot hold the flush up.
-        for _ in 0..WAITING {
-            let Some(raw) = self.tap.take() else { break };
+        let mut waiting: Vec<Raw> =
+            self.taps.iter().flat_map(|ear| (0..WAITING).map_while(|_| ear.tap.take())).collect();
+        if self.taps.len() > 1 {
+            waiting.sort_by_key(|raw| raw.received);
+        }
+        for raw in waiting {
             let sample = Sample {
                 key: &raw.key,
                 encoding: &raw.encoding,
@@ -106,12 +161,12 @@ impl Desk {
                 attachment: (!raw.attachment.is_empty()).then_some(&raw.attachment[..]),
                 received: raw.received,
             };
-            match recorder.write(sample) {
+            match series.write(sample) {
                 Err(fault) if !fault.is_final() => tracing::warn!("{fault}"),
                 other => other?,
             }
         }
-        recorder.flush_if_due(now).map(drop)
+        series.flush_if_due(now).map(drop)
     }
 }
 

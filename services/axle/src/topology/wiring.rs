@@ -2,9 +2,10 @@
 
 use super::{Service, Topology};
 use crate::catalog::{self, Entry, Wires, is_shared};
+use crate::run::composed::ComposedParams;
 use axle_schema::RobotId;
 use axle_schema::key::Port;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A service of a topology with what it is in the catalogue.
 #[derive(Clone, Copy)]
@@ -24,6 +25,15 @@ impl Node<'_> {
     /// Its wires, with the inputs that differ in this topology.
     pub(crate) fn wires(&self) -> Wires {
         let mut wires = (self.entry.wires)(self.entry.name);
+        if self.entry.name == "emulator" && self.service.board.is_some() {
+            wires = catalog::emulated_board();
+        }
+        // What is wrong with its parameters is refused when it starts.
+        if self.entry.name == "composed"
+            && let Ok(params) = self.service.params.clone().try_into::<ComposedParams>()
+        {
+            wires = catalog::composed_of(&params);
+        }
         for port in wires.needs.iter_mut().chain(&mut wires.hears) {
             if let Some(other) = self.service.inputs.get(&port.to_string()) {
                 // What is not known was refused when the file was read.
@@ -69,8 +79,8 @@ impl Topology {
                 let hears = to.wires();
                 let heard = hears.needs.iter().chain(&hears.hears);
                 let streams = heard.filter(|port| says.says.contains(port)).map(|port| (*port, false));
-                let calls =
-                    hears.answers.iter().filter(|port| says.asks.contains(port)).map(|port| (*port, true));
+                let asked = |port: &&Port| says.asks.contains(port) || says.may_ask.contains(port);
+                let calls = hears.answers.iter().filter(asked).map(|port| (*port, true));
                 all.extend(streams.chain(calls).map(|(port, is_call)| Wire {
                     from: *from,
                     to: *to,
@@ -118,27 +128,42 @@ impl Topology {
 
     /// Services that ask each other in a circle: the first question would wait for itself.
     fn cycle(&self) -> Option<String> {
-        let wires = self.wires();
-        let asked = |of: usize| wires.iter().filter(move |wire| wire.is_call && wire.from.index == of);
-        for start in self.nodes() {
-            let (mut path, mut open) = (vec![start.index], vec![(start.index, 0)]);
-            while let Some((at, next)) = open.pop() {
-                path.truncate(open.len() + 1);
-                if let Some(wire) = asked(at).nth(next) {
-                    open.push((at, next + 1));
-                    let to = wire.to.index;
-                    if to == start.index {
-                        return Some(format!("{} asks itself in a circle, by {}", start.name(), wire.port));
-                    }
-                    if !path.contains(&to) {
-                        path.push(to);
-                        open.push((to, 0));
-                    }
+        let calls: Vec<_> = self.wires().into_iter().filter(|wire| wire.is_call).collect();
+        let edges: Vec<_> = calls.iter().map(|wire| (wire.from.index, wire.to.index)).collect();
+        let names = circle(&edges)?.into_iter().map(|edge| {
+            let wire = &calls[edge];
+            format!("{} asks {} of {}", wire.from.name(), wire.port, wire.to.name())
+        });
+        Some(format!("a question would wait for itself: {}", names.collect::<Vec<_>>().join(", ")))
+    }
+}
+
+/// A circle of these edges, as their numbers in the order of the walk; none if there is none.
+fn circle(edges: &[(usize, usize)]) -> Option<Vec<usize>> {
+    // A node that was left without a circle is in none.
+    let mut left = BTreeSet::new();
+    for &(start, _) in edges {
+        // The edges of the walk so far, each with the place in the list where the next one is looked for.
+        let mut walk: Vec<usize> = Vec::new();
+        let mut place = 0;
+        let mut at = start;
+        loop {
+            let on = (place..edges.len()).find(|&edge| edges[edge].0 == at && !left.contains(&edges[edge].1));
+            if let Some(edge) = on {
+                let to = edges[edge].1;
+                walk.push(edge);
+                if let Some(begin) = walk.iter().position(|&edge| edges[edge].0 == to) {
+                    return Some(walk.split_off(begin));
                 }
+                (at, place) = (to, 0);
+            } else {
+                left.insert(at);
+                let Some(back) = walk.pop() else { break };
+                (at, place) = (edges[back].0, back + 1);
             }
         }
-        None
     }
+    None
 }
 
 /// Which services of the catalogue would help.
@@ -201,6 +226,13 @@ mod tests {
             DEFAULT,
             include_str!("../../../../deploy/topologies/composed.toml"),
             include_str!("../../../../deploy/topologies/two-computers.toml"),
+            include_str!("../../../../deploy/topologies/compose.toml"),
+            include_str!("../../../../deploy/topologies/compose-real.toml"),
+            include_str!("../../../../deploy/topologies/fleet.toml"),
+            include_str!("../../../../deploy/topologies/ten-robots.toml"),
+            include_str!("../../../../deploy/topologies/roomba.toml"),
+            include_str!("../../../../deploy/topologies/fleet.toml"),
+            include_str!("../../../../deploy/topologies/warehouse.toml"),
         ] {
             let topology = Topology::parse(text).expect("a topology");
             assert_eq!(topology.faults(), Vec::<String>::new());
@@ -209,9 +241,28 @@ mod tests {
     }
 
     #[test]
+    fn questions_that_would_wait_for_themselves_are_found() {
+        // The pilot asks both planners, and one of those the map.
+        assert_eq!(circle(&[(0, 1), (0, 2), (1, 3), (2, 3)]), None);
+        assert_eq!(circle(&[]), None);
+        assert_eq!(circle(&[(4, 4)]), Some(vec![0]));
+        assert_eq!(circle(&[(0, 1), (1, 2), (0, 2), (2, 3), (3, 1)]), Some(vec![1, 3, 4]));
+        let line: Vec<_> = (0..1000).map(|node| (node, node + 1)).collect();
+        assert_eq!(circle(&line), None);
+        let ring: Vec<_> = line.into_iter().chain([(1000, 0)]).collect();
+        assert_eq!(circle(&ring).map(|ring| ring.len()), Some(1001));
+    }
+
+    #[test]
     fn what_nobody_says_or_answers_is_named_with_who_would() {
         let found = faults(&services(&["navigator"]));
-        assert_eq!(found, ["navigator of r1 needs source/recent, which nobody says; add source"]);
+        assert_eq!(
+            found,
+            [
+                "navigator of r1 needs source/recent, which nobody says; add source",
+                "navigator of r1 asks source/window, which nobody answers; add source"
+            ]
+        );
         let found = faults(&services(&["emulator", "source", "navigator", "pilot"]));
         assert!(
             found
@@ -227,6 +278,23 @@ mod tests {
         let both = |port| format!("emulator of r1 and composed of r1 both say {port}");
         assert!(found.iter().any(|fault| fault.starts_with(&both("gate/state"))), "{found:?}");
         assert!(found.iter().any(|fault| fault.starts_with(&both("robot/encoders"))), "{found:?}");
+    }
+
+    #[test]
+    fn the_partners_of_a_composed_robot_are_those_of_its_parameters() {
+        let four = ["composed", "motor-left", "motor-right", "encoder-left", "encoder-right"];
+        let with = |kinds: &[&str], params: &str| {
+            let (first, rest) = kinds.split_first().expect("a service");
+            faults(&format!("{}params = {{ {params} }}\n{}", services(&[first]), services(rest)))
+        };
+        let encoders = "encoders = { left = \"encoder-left\", right = \"encoder-right\" }";
+        assert_eq!(with(&four, encoders), Vec::<String>::new());
+        let found = with(&four[..3], encoders);
+        assert!(found.iter().any(|fault| fault.contains("needs encoder-left/reading")), "{found:?}");
+        assert_eq!(with(&four[..3], ""), Vec::<String>::new());
+        // A motor that Axle does not know may be a program in any language.
+        let foreign = "motors = { left = \"motor-mine\", right = \"motor-right\" }, encoders = { left = \"motor-mine\", right = \"motor-right\" }";
+        assert_eq!(with(&["composed", "motor-right"], foreign), Vec::<String>::new());
     }
 
     #[test]

@@ -17,7 +17,7 @@ const CIRCLE: Sides<MetresPerSecond> = Sides::new(MetresPerSecond(0.4), MetresPe
 /// Commands until it is told to stop; a lease that is lost is not asked for again.
 pub(crate) async fn command(settings: &Settings) -> anyhow::Result<()> {
     let robot = settings.one_robot()?;
-    let mesh = join(settings.mesh("bench-commander", Some(&robot)), Patience::Forever).await?;
+    let mesh = join(settings.mesh("bench-commander", Some(&robot))?, Patience::Forever).await?;
     let encoders = mesh.inbox(&key::ENCODERS.of(&robot), 1)?;
     let commands = mesh.publisher(&key::COMMAND.of(&robot))?;
     let ask = LeaseAsk { holder: mesh.name(), class: Class::Corrector, period: PERIOD };

@@ -26,6 +26,8 @@ pub(super) struct History {
     open: VecDeque<(Cause, Tick)>,
     /// How old commands were when they were obeyed, in ms; each is up to one reading too old.
     pub(super) ages: Vec<f64>,
+    /// Commands that were obeyed and never heard here, after an overflow: they cannot be judged.
+    pub(super) unjudged: usize,
 }
 
 impl History {
@@ -38,6 +40,7 @@ impl History {
             obeyed: None,
             open: VecDeque::new(),
             ages: Vec::new(),
+            unjudged: 0,
         })
     }
 
@@ -46,13 +49,13 @@ impl History {
         &mut self,
         patience: Duration,
         is_right: impl Fn(&GateState) -> bool,
-    ) -> Option<GateState> {
+    ) -> Option<Heard<GateState>> {
         let end = Instant::now() + patience;
         loop {
             self.look();
-            let Heard { message, .. } = timeout_at(end, self.states.next()).await.ok()?;
-            if is_right(&message) {
-                return Some(message);
+            let heard = timeout_at(end, self.states.next()).await.ok()?;
+            if is_right(&heard.message) {
+                return Some(heard);
             }
         }
     }
@@ -88,9 +91,12 @@ impl History {
             }
             heard.is_none()
         });
-        // A command that was never heard here cannot be judged; it is one of very few, after an overflow.
-        while self.open.len() > REMEMBERED {
-            self.open.pop_front();
-        }
+    }
+
+    /// Gives up what waits for a command that was never heard: whoever said it is gone, and everything it said has come.
+    pub(super) fn close(&mut self) {
+        self.look();
+        self.unjudged += self.open.len();
+        self.open.clear();
     }
 }

@@ -1,10 +1,10 @@
 //! One injection: a robot drives, its commander is lost, the wheels brake and stand.
 
 use super::history::History;
-use super::wire::Wire;
+use crate::bench::proxy::{Bytes, Proxy};
 use anyhow::Context as _;
-use axle_mesh::{Mesh, Retry, random_bits};
-use axle_schema::command::{AllStop, Done, Enable, GateState, Motion};
+use axle_mesh::{Heard, Mesh, Retry, clock, random_bits};
+use axle_schema::command::{AllStop, Class, Done, Enable, GateState, Motion};
 use axle_schema::{RobotId, StopId, key};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -36,8 +36,17 @@ pub(super) struct Injected {
     pub(super) may_go_on: bool,
     /// Ages of the commands that were obeyed, in ms, by the robot's clock.
     pub(super) ages: Vec<f64>,
-    /// From an AllStop of another process to the word that the wheels brake.
-    pub(super) all_stop: Option<Duration>,
+    /// How many commands that were obeyed could not be judged, since nobody heard them here.
+    pub(super) unjudged: usize,
+    /// What an AllStop of this process took.
+    pub(super) all_stop: Option<Stopped>,
+}
+
+/// From an AllStop of another process to the first setpoint that brakes, and until the word of it was back.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stopped {
+    pub(super) braking: Duration,
+    pub(super) heard: Duration,
 }
 
 /// Waits for what must come at all; no figure is judged by it.
@@ -51,13 +60,13 @@ const NOTICED: Duration = Duration::from_millis(300);
 pub(super) struct Site {
     mesh: Mesh,
     robot: RobotId,
-    wire: Wire,
+    wire: Proxy,
     history: History,
 }
 
 impl Site {
     pub(super) async fn new(mesh: &Mesh, robot: RobotId, endpoint: &str) -> anyhow::Result<Self> {
-        let wire = Wire::to(endpoint.trim_start_matches("tcp/").to_owned()).await?;
+        let wire = Proxy::to(endpoint, Bytes::Messages, 0).await?;
         let history = History::of(mesh, &robot)?;
         Ok(Self { mesh: mesh.clone(), robot, wire, history })
     }
@@ -77,7 +86,7 @@ impl Site {
         }
         let lost = Instant::now();
         let brakes = |state: &GateState| state.motion != Motion::Driving;
-        let braking = self.history.state(outage.min(MISSED), brakes).await;
+        let braking = self.history.state(outage.min(MISSED), brakes).await.map(|heard| heard.message);
         let brake = braking.as_ref().map(|_| lost.elapsed());
         let standstill = match &braking {
             Some(braking) => {
@@ -85,7 +94,7 @@ impl Site {
                 let patience = outage.max(MISSED);
                 let standing = match braking.motion {
                     Motion::Standing => Some(braking.clone()),
-                    _ => self.history.state(patience, stands).await,
+                    _ => self.history.state(patience, stands).await.map(|heard| heard.message),
                 };
                 standing.map(|standing| {
                     let ms = standing.tick.since(braking.tick).max(0).unsigned_abs();
@@ -112,10 +121,11 @@ impl Site {
         };
         end(&mut commander).await?;
         self.rest().await?;
-        self.history.look();
+        self.history.close();
         let ages = std::mem::take(&mut self.history.ages);
+        let unjudged = std::mem::take(&mut self.history.unjudged);
         let may_go_on = outage < NOTICED;
-        Ok(Injected { fault, brake, standstill, may_go_on, ages, all_stop })
+        Ok(Injected { fault, brake, standstill, may_go_on, ages, unjudged, all_stop })
     }
 
     /// Starts a commander, and waits until its robot drives; at a random moment between two of its commands.
@@ -135,23 +145,32 @@ impl Site {
     }
 
     /// Lets the robot drive once more, and stops it from this process.
-    async fn all_stop(&mut self) -> anyhow::Result<Duration> {
+    async fn all_stop(&mut self) -> anyhow::Result<Stopped> {
         self.rest().await?;
         let mut commander = self.under_way().await?;
         let order = AllStop { id: StopId::from_random(random_bits()), by: self.mesh.name() };
-        let told = Instant::now();
+        let (told, at) = (Instant::now(), clock::wall());
         self.mesh.put_once(&key::STOP.of(&self.robot), &order)?;
         let stopped = |state: &GateState| state.stop == Some(order.id) && state.motion != Motion::Driving;
-        let state = self.history.state(PATIENCE, stopped).await.context("the gate does not stop")?;
-        let took = told.elapsed();
-        let enable = Enable { stop: state.stop, boot: state.boot, echo: state.tick, by: self.mesh.name() };
+        let Heard { message: state, meta } =
+            self.history.state(PATIENCE, stopped).await.context("the gate does not stop")?;
+        let heard = told.elapsed();
+        // The gate says what it does after it has given the setpoint to the wheels. Both clocks are those of this computer.
+        let braking = meta.map_or(heard, |meta| Duration::from_secs_f64((meta.stamp - at).max(0.0)));
+        let enable = Enable {
+            stop: state.stop,
+            boot: state.boot,
+            echo: state.tick,
+            by: self.mesh.name(),
+            class: Class::Manual,
+        };
         let Done {} = self
             .mesh
             .ask(&key::ENABLE, Some(&self.robot), &enable, PATIENCE, Retry::Idempotent)
             .await
             .context("enable the robot again")?;
         end(&mut commander).await?;
-        Ok(took)
+        Ok(Stopped { braking, heard })
     }
 
     /// Waits until the robot stands and nobody holds its wheels.

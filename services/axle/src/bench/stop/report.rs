@@ -1,6 +1,7 @@
 //! What all injections come to.
 
-use super::injection::{Fault, Injected};
+use super::injection::{Fault, Injected, Stopped};
+use crate::bench::quantile;
 use crate::out::{data, table};
 use std::time::Duration;
 
@@ -11,11 +12,14 @@ pub(super) struct Report {
     kinds: [usize; 3],
     brake: Times,
     standstill: Times,
-    all_stop: Times,
+    /// From an AllStop to the setpoint that brakes, and to the word of it.
+    all_stop: [Times; 2],
     /// The oldest command that was obeyed, and how many were too old, by the robot's clock.
     oldest_ms: f64,
     stale: usize,
     obeyed: usize,
+    /// Commands that were obeyed and not heard by the bench, so that nothing is known of their age.
+    unjudged: usize,
     /// Injections after which the wheels went on, or did not come to rest.
     missed: usize,
     gate_us: f64,
@@ -31,15 +35,7 @@ impl Times {
         Self(times)
     }
     fn at(&self, share: f64) -> f64 {
-        let last = self.0.len().saturating_sub(1);
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            clippy::cast_precision_loss,
-            reason = "an index"
-        )]
-        let index = (last as f64 * share).ceil() as usize;
-        self.0.get(index).copied().unwrap_or(f64::NAN)
+        quantile(&self.0, share)
     }
     fn to_json(&self) -> serde_json::Value {
         serde_json::json!({ "p50": self.at(0.5), "p99": self.at(0.99), "max": self.at(1.0) })
@@ -55,6 +51,8 @@ impl Report {
         let count = |is: fn(&Fault) -> bool| injected.iter().filter(|one| is(&one.fault)).count();
         let ages = || injected.iter().flat_map(|one| one.ages.iter().copied());
         let noticed = || injected.iter().filter(|one| !one.may_go_on);
+        let stops = || injected.iter().filter_map(|one| one.all_stop);
+        let all_stop = |time: fn(Stopped) -> Duration| Times::of(stops().map(time));
         Self {
             kinds: [
                 count(|fault| matches!(fault, Fault::Kill)),
@@ -63,10 +61,11 @@ impl Report {
             ],
             brake: Times::of(noticed().filter_map(|one| one.brake)),
             standstill: Times::of(noticed().filter_map(|one| one.standstill)),
-            all_stop: Times::of(injected.iter().filter_map(|one| one.all_stop)),
+            all_stop: [all_stop(|stopped| stopped.braking), all_stop(|stopped| stopped.heard)],
             oldest_ms: ages().fold(0.0, f64::max),
             stale: ages().filter(|age| *age > OLDEST).count(),
             obeyed: ages().count(),
+            unjudged: injected.iter().map(|one| one.unjudged).sum(),
             missed: noticed().filter(|one| one.brake.is_none() || one.standstill.is_none()).count(),
             gate_us,
         }
@@ -78,8 +77,9 @@ impl Report {
             let line = serde_json::json!({
                 "injections": kills + freezes + cuts, "kills": kills, "freezes": freezes, "cuts": cuts,
                 "brake_ms": self.brake.to_json(), "standstill_ms": self.standstill.to_json(),
-                "all_stop_ms": self.all_stop.to_json(), "stale_applied": self.stale, "missed": self.missed,
-                "commands_judged": self.obeyed, "oldest_applied_ms": self.oldest_ms,
+                "all_stop_ms": self.all_stop[0].to_json(), "all_stop_heard_ms": self.all_stop[1].to_json(),
+                "stale_applied": self.stale, "missed": self.missed, "commands_judged": self.obeyed,
+                "commands_unjudged": self.unjudged, "oldest_applied_ms": self.oldest_ms,
                 "gate_command_us": self.gate_us,
             });
             data(&line.to_string())?;
@@ -87,13 +87,14 @@ impl Report {
             let rows = [
                 self.brake.row("from a fault to braking"),
                 self.standstill.row("from braking to standstill"),
-                self.all_stop.row("from an AllStop to braking"),
+                self.all_stop[0].row("from an AllStop to braking"),
+                self.all_stop[1].row("until the word of that is back"),
             ];
             table(&["", "times", "p50", "p99", "max"], rows)?;
             data(&format!(
                 "{kills} kills, {freezes} freezes, {cuts} cuts: {} missed; of {} commands that were obeyed {} were too old, \
-                 the oldest was {:.0} ms old; the gate costs a command {:.1} µs",
-                self.missed, self.obeyed, self.stale, self.oldest_ms, self.gate_us
+                 the oldest was {:.0} ms old, {} more could not be judged; the gate costs a command {:.1} µs",
+                self.missed, self.obeyed, self.stale, self.oldest_ms, self.unjudged, self.gate_us
             ))?;
         }
         anyhow::ensure!(

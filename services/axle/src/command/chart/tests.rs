@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::command::convert::converted;
-use axle_schema::key;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 const CIRCLE: &str = r#"{"v0l":0.25,"v0r":0.5,"v1l":0.25,"v1r":0.5,"T":2}"#;
@@ -150,7 +149,7 @@ fn a_long_run_stays_bounded() {
 #[test]
 fn a_chart_of_runs_says_what_it_shows() {
     let source = |lines: &str| Source::Run(good(lines), 1, 0);
-    let one = svg(&[("way.jsonl".into(), source(CIRCLE))]).expect("a chart");
+    let one = svg(&[("way.jsonl".into(), source(CIRCLE))], &[]).expect("a chart");
     for word in [
         "way.jsonl",
         "start",
@@ -162,12 +161,15 @@ fn a_chart_of_runs_says_what_it_shows() {
     ] {
         assert!(one.contains(word), "no {word:?}");
     }
-    let geometry = svg(&[("way.jsonl".into(), source(r#"{"line":{"length":1}}"#))]).expect("a chart");
+    let geometry = svg(&[("way.jsonl".into(), source(r#"{"line":{"length":1}}"#))], &[]).expect("a chart");
+    let wall = (axle_maps::Ink::Occupied, [(2.0, 0.0), (3.0, 0.0), (3.0, 1.0), (2.0, 1.0)]);
+    let walled = svg(&[("way.jsonl".into(), source(CIRCLE))], &[wall]).expect("a chart");
+    assert!(walled.matches("<polygon").count() > one.matches("<polygon").count(), "the wall is drawn");
     assert!(!geometry.contains("time (s)"), "a geometry has no time");
-    let two = svg(&[("a".into(), source(CIRCLE)), ("b".into(), source(r#"{"line":{"length":1}}"#))])
+    let two = svg(&[("a".into(), source(CIRCLE)), ("b".into(), source(r#"{"line":{"length":1}}"#))], &[])
         .expect("a chart");
     assert!(two.contains("\na, b\n") && two.contains("wheel speed (m/s)"));
-    assert!(svg(&[("none".into(), source(""))]).unwrap_err().to_string().contains("nothing to draw"));
+    assert!(svg(&[("none".into(), source(""))], &[]).unwrap_err().to_string().contains("nothing to draw"));
 }
 
 #[test]
@@ -234,7 +236,11 @@ fn a_recording_is_drawn_as_the_demo_draws_it() {
         open(&file.display().to_string(), None, &|words| complaints.borrow_mut().push(words.to_owned()));
     std::fs::remove_file(&file).expect("the file was there");
     let Ok(Source::Recording(heard)) = source else { panic!("an MCAP file is a recording") };
-    assert_eq!(complaints.into_inner(), ["1 samples and chunks could not be read"]);
+    let complaints = complaints.into_inner();
+    assert!(
+        complaints.len() == 1 && complaints[0].starts_with("1 samples could not be read"),
+        "{complaints:?}"
+    );
     let paths = heard.paths();
     let lasts: Vec<_> = paths
         .iter()
@@ -251,7 +257,7 @@ fn a_recording_is_drawn_as_the_demo_draws_it() {
     assert_eq!(heard.way_points, [(0.0, 0.0), (1.0, 0.0)]);
     let real = heard.wheels.real.last().expect("a beat");
     assert_eq!((real.time, real.left, real.right, heard.wheels.due.len()), (0.75, 0.75, 0.375, 4));
-    let alone = svg(&[("run.mcap".into(), Source::Recording(heard))]).expect("a chart");
+    let alone = svg(&[("run.mcap".into(), Source::Recording(heard))], &[]).expect("a chart");
     for word in ["planned", "true", "estimated", "way point", "left wheel, due", "right wheel, real"] {
         assert!(alone.contains(word), "no {word:?}");
     }

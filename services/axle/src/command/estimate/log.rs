@@ -1,19 +1,19 @@
 //! A log of measurements: JSON lines, or a recording.
 //!
 //! The first line may say where the robot starts and how wide it is: `{"start":{"x","y","heading"},"track":0.3}`. Every
-//! other line has a stamp and one or more of `encoders`, `gyro`, `fix`, `range` and `truth`.
+//! other line has a stamp and one or more of `encoders`, `gyro` (and beside it `ax`), `fix`, `range` and `truth`.
 
-use crate::lines::{Lines, read};
+use crate::lines::Lines;
 use crate::out::{note, usage};
+use crate::unread::Unread;
 use axle_navigator::{Measurement, NavigatorParams, Range};
 use axle_recorder::{Entry, Recorded, Recording};
 use axle_schema::codec::decode_as;
 use axle_schema::{
-    EncodersData, Fix, HeadingFix, InertialData, Message, Metres, NavigatorData, Numbers, Pose, Radians,
-    RadiansPerSecond, Refusal, Seconds, Track, key,
+    EncodersData, Fix, HeadingFix, InertialData, Message, Metres, MetresPerSecondSquared, NavigatorData,
+    Numbers, Pose, Radians, RadiansPerSecond, Refusal, Seconds, Track, key,
 };
 use serde::Deserialize;
-use serde_json::Value;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -47,18 +47,16 @@ pub(super) struct Log {
     pub(super) bad: u64,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct First {
-    start: Option<Pose>,
-    track: Option<Track>,
-}
+/// A line of any kind: the first one has no stamp.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Line {
-    stamp: Seconds,
+    start: Option<Pose>,
+    track: Option<Track>,
+    stamp: Option<Seconds>,
     encoders: Option<Wheels>,
     gyro: Option<RadiansPerSecond>,
+    ax: Option<MetresPerSecondSquared>,
     fix: Option<Position>,
     range: Option<Distance>,
     truth: Option<There>,
@@ -108,8 +106,8 @@ impl Log {
 
     pub(super) fn lines(input: impl Read, params: &mut NavigatorParams) -> anyhow::Result<Self> {
         let (mut log, mut lines) = (Self::default(), Lines::new(input));
-        while let Some(value) = lines.read()? {
-            if let Err(why) = value.and_then(|value| log.line(&value, params)) {
+        while let Some(line) = lines.read_as()? {
+            if let Err(why) = line.and_then(|line| log.line(line, params)) {
                 log.bad += 1;
                 note(&format!("line {}: {why}", lines.number()));
             }
@@ -118,34 +116,37 @@ impl Log {
         Ok(log)
     }
 
-    fn line(&mut self, value: &Value, params: &mut NavigatorParams) -> Result<(), String> {
-        if value.get("stamp").is_none() && self.items.is_empty() {
-            let first: First = read(value)?;
-            params.start = first.start.unwrap_or(params.start);
-            params.robot.track = first.track.unwrap_or(params.robot.track);
+    fn line(&mut self, line: Line, params: &mut NavigatorParams) -> Result<(), String> {
+        let Line { start, track, stamp, encoders, gyro, ax, fix, range, truth } = line;
+        let Some(stamp) = stamp else {
+            if !self.items.is_empty() || encoders.is_some() || gyro.is_some() {
+                return Err("missing field `stamp`".into());
+            }
+            params.start = start.unwrap_or(params.start);
+            params.robot.track = track.unwrap_or(params.robot.track);
             return Ok(());
+        };
+        if start.is_some() || track.is_some() {
+            return Err("start and track stand in a line of their own, without a stamp".into());
         }
-        let Line { stamp, encoders, gyro, fix, range, truth } = read(value)?;
-        let mut measured = Vec::new();
+        if ax.is_some() && gyro.is_none() {
+            return Err("ax stands beside gyro".into());
+        }
         // The gyro is before the encoders: so a span finds the angle that belongs to it.
-        measured
-            .extend(gyro.map(|gyro| Measurement::Inertial(InertialData { stamp, gyro, ax: None, ay: None })));
-        measured.extend(
-            encoders.map(|Wheels { left, right }| Measurement::Encoders(EncodersData { stamp, left, right })),
-        );
-        measured.extend(fix.map(|fix| Measurement::Fix(fix.at(stamp))));
-        measured.extend(
-            range.map(|Distance { x, y, distance, sd }| {
-                Measurement::Range(Range { stamp, x, y, distance, sd })
-            }),
-        );
-        if measured.is_empty() && truth.is_none() {
+        let inertial = gyro.map(|gyro| Measurement::Inertial(InertialData { stamp, gyro, ax, ay: None }));
+        let encoders =
+            encoders.map(|Wheels { left, right }| Measurement::Encoders(EncodersData { stamp, left, right }));
+        let fix = fix.map(|fix| Measurement::Fix(fix.at(stamp)));
+        let range = range
+            .map(|Distance { x, y, distance, sd }| Measurement::Range(Range { stamp, x, y, distance, sd }));
+        let measured = [inertial, encoders, fix, range];
+        if measured.iter().all(Option::is_none) && truth.is_none() {
             return Err("nothing but a stamp: encoders, gyro, fix, range or truth is missing".into());
         }
-        if let Some(wrong) = measured.iter().find(|measurement| !measurement.is_sound()) {
+        if let Some(wrong) = measured.iter().flatten().find(|measurement| !measurement.is_sound()) {
             return Err(format!("{wrong:?} is not sound: an sd must be above 0, and no number beyond 1e9"));
         }
-        self.items.extend(measured.into_iter().map(Item::Measured));
+        self.items.extend(measured.into_iter().flatten().map(Item::Measured));
         self.items.extend(truth.map(|truth| {
             let heading = truth.heading.map(|heading| heading.0);
             Item::Truth(Truth { stamp: stamp.0, x: truth.x.0, y: truth.y.0, heading })
@@ -155,18 +156,23 @@ impl Log {
 
     fn recording(path: &Path, params: &mut NavigatorParams) -> anyhow::Result<Self> {
         let mut recording = Recording::open(path)?;
-        let (mut log, mut robot) = (Self::default(), None);
+        let (mut log, mut robot, mut unread) = (Self::default(), None, Unread::default());
         for entry in recording.by_ref() {
             let Entry::Sample(sample) = entry else { continue };
             log.lines += 1;
             match log.sample(&sample, &mut robot) {
                 Ok(()) if log.items.len() < MOST => {}
-                _ => log.bad += 1,
+                Ok(()) => log.bad += 1,
+                Err(refusal) => {
+                    log.bad += 1;
+                    unread.add(&sample.key, &refusal);
+                }
             }
         }
         if let Some(why) = &recording.account().cut {
             note(&format!("the recording is cut off: {why}"));
         }
+        unread.words().inspect(|words| note(words));
         // An emulated robot says where it starts; of another one the parameters do.
         if let Some(Item::Truth(Truth { x, y, heading: Some(heading), .. })) =
             log.items.iter().find(|item| matches!(item, Item::Truth(_)))
@@ -186,6 +192,7 @@ impl Log {
             ("robot", "encoders") => Item::Measured(Measurement::Encoders(decoded(sample)?)),
             ("robot", "inertial") => Item::Measured(Measurement::Inertial(decoded(sample)?)),
             ("robot", "fix") => Item::Measured(Measurement::Fix(decoded(sample)?)),
+            ("robot", "range") => Item::Measured(Measurement::Range(decoded(sample)?)),
             ("emulator", "truth") => {
                 let NavigatorData { stamp, pose, .. } = decoded(sample)?;
                 let heading = Some(pose.heading.0);
