@@ -3,6 +3,10 @@
 //! `cargo test -p axle --test whole` runs them all, `cargo test -p axle --test whole drive::` those of one module.
 
 #[cfg(test)]
+mod board;
+#[cfg(test)]
+mod calibrate;
+#[cfg(test)]
 mod conform;
 #[cfg(test)]
 mod drive;
@@ -14,6 +18,12 @@ mod input;
 mod life;
 #[cfg(test)]
 mod mesh;
+#[cfg(test)]
+mod page;
+#[cfg(test)]
+mod record;
+#[cfg(test)]
+mod secure;
 #[cfg(test)]
 mod tidy;
 #[cfg(test)]

@@ -5,8 +5,10 @@ mod composed;
 mod contract;
 mod correctors;
 mod faults;
+mod fleet;
 mod holder;
 mod latch;
+mod navigator;
 mod teleop;
 
 use crate::harness::{Process, Robot};

@@ -9,7 +9,7 @@ mod robot;
 mod stranger;
 
 pub(crate) use process::{Ended, Process, children, driven, is_alive};
-pub(crate) use robot::{Eyes, Robot, SERVICES, r1, stands};
+pub(crate) use robot::{Eyes, Robot, SERVICES, r1, stands, velocity};
 pub(crate) use stranger::Stranger;
 
 use axle_mesh::{Mesh, Patience, Settings};
@@ -148,8 +148,9 @@ pub(crate) async fn join(endpoint: &str, service: &str) -> Mesh {
         service: service.into(),
         robot: "r1".into(),
         inputs: Vec::new(),
+        link: axle_mesh::Link::default(),
     };
-    Mesh::join(settings, Patience::AtMost(PATIENCE), |_| {}).await.expect("a router")
+    Mesh::join(settings, Patience::AtMost(PATIENCE), |_, _| {}).await.expect("a router")
 }
 
 /// A router in the process of the test.

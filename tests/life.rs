@@ -2,6 +2,7 @@
 
 mod demo;
 mod doctor;
+mod planner;
 mod topology;
 mod tournament;
 mod up;

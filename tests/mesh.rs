@@ -8,5 +8,5 @@ use axle_schema::{PlanAsk, WayTask};
 
 /// A question for Pathfinder.
 fn question() -> PlanAsk {
-    PlanAsk { way: WayTask::parse("1,0").expect("a way"), start: None }
+    PlanAsk { way: WayTask::parse("1,0").expect("a way"), ..PlanAsk::default() }
 }

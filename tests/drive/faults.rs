@@ -1,9 +1,12 @@
 //! Services that die or freeze while the robot drives (fault matrix, rows 1, 2, 15, 31, 42).
 
-use crate::harness::{Eyes, Robot, all_alive, declared, eventually, is_alive, stands};
+use crate::harness::{
+    Eyes, PATIENCE, Robot, all_alive, declared, eventually, free_endpoint, is_alive, r1, stands, within,
+};
 use axle_schema::command::{BrakeCause, GateState, Motion};
 use axle_schema::meta::Cause;
-use axle_schema::{EncodersData, Message, Seconds};
+use axle_schema::task::Phase;
+use axle_schema::{EncodersData, Message, Seconds, key};
 use nix::sys::signal::Signal;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
@@ -141,6 +144,30 @@ async fn whoever_owns_the_wheels_brakes_before_it_ends() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn the_process_of_the_wheels_that_freezes_brakes_when_it_wakes_up_and_obeys_nothing_old() {
+    let robot = Robot::new().await;
+    let mut go = robot.on_its_way().await;
+    let eyes = robot.eyes().await;
+    robot.service("emulator").freeze().await;
+    let before = eyes.states.latest().map(|heard| heard.message.accepted);
+    // Commands go on until the corrector misses the measurements; they wait for the process to wake up.
+    go.ended().await.is(1, &["not reached"]);
+    robot.service("emulator").tell(Signal::SIGCONT);
+    // To the robot its clock has jumped: every command that has waited is too old now.
+    let state = eyes.hears("it stands", |state| state.motion == Motion::Standing).await;
+    assert_eq!(state.holder, None, "{state:?}");
+    let rest = eyes.sees_rest().await;
+    let later = eyes.hears("the gate's account", |state| time_of(state) > rest.stamp.0 + 0.3).await;
+    assert_eq!(
+        (later.motion, later.accepted),
+        (Motion::Standing, state.accepted),
+        "{later:?}, before {before:?}"
+    );
+    all_alive(&robot.mesh, &["emulator"]).await;
+    robot.drives_again().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_planner_that_is_gone_is_named_with_what_to_start() {
     let robot = Robot::new().await;
     robot.service("pathfinder").tell(Signal::SIGKILL);
@@ -153,6 +180,32 @@ async fn a_planner_that_is_gone_is_named_with_what_to_start() {
     assert!(eyes.truths().iter().all(stands), "without a plan nothing moves");
     assert_eq!(eyes.states.latest().map_or(0, |heard| heard.message.accepted), 0);
     let _again = robot.world.run("pathfinder");
+    robot.drives_again().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_second_pathfinder_elsewhere_takes_over_without_a_lost_task() {
+    let robot = Robot::new().await;
+    // Another computer, whose router links to the one of the robot.
+    let elsewhere = free_endpoint();
+    let _router = robot.world.axle(&["router", "--listen", &elsewhere, "--link", &robot.world.endpoint]);
+    let _second = robot.world.axle(&["run", "pathfinder", "--host", "elsewhere", "--connect", &elsewhere]);
+    let mut comings = robot.mesh.watch_presence().expect("presence");
+    let came = async { while comings.next().await.0.host != "elsewhere" {} };
+    within(PATIENCE, "the second pathfinder is there", came).await;
+    robot.reaches("0.2,0").await;
+    // The first one has the question of a task in its hands, and dies without an answer.
+    let words = robot.mesh.inbox(&key::GO_PROGRESS.of(&r1()), 64).expect("progress");
+    declared(&robot.mesh).await;
+    robot.service("pathfinder").freeze().await;
+    let mut go = robot.go("0.4,0");
+    let planning = async { while words.next().await.message.phase != Phase::Planning {} };
+    within(PATIENCE, "the task is being planned", planning).await;
+    robot.service("pathfinder").tell(Signal::SIGKILL);
+    let ended = go.ended().await;
+    if !ended.was_late() {
+        ended.is(0, &["reached: 1 of 1 way points"]);
+    }
     robot.drives_again().await;
 }
 

@@ -139,10 +139,31 @@ async fn a_flood_of_garbage_holds_up_neither_the_gate_nor_who_holds_it() {
     flooding.await.expect("the flood");
     let state = held.refused(10_000).await;
     let count = |reject| state.rejected.get(&reject).copied().unwrap_or_default();
-    assert_eq!(count(Reject::Malformed) + count(Reject::Flood), 10_000, "{state:?}");
+    // Of the commands some may be among those that are too many for a beat.
+    let refused = count(Reject::Malformed) + count(Reject::Flood);
+    assert!((10_000..=10_000 + said).contains(&refused), "{said} were said in the flood: {state:?}");
     assert!(state.accepted >= 1 && said >= 1, "{said} were said in the flood: {state:?}");
     // The gate beats on: its next account is a fresh one, and a stop is obeyed.
     held.world.done(&["stop"]).await.is(0, &["r1 is stopped"]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_log_that_nobody_reads_does_not_hold_up_the_gate() {
+    let world = World::new().await;
+    let _router = world.router();
+    let args = ["run", "emulator", "--host", "lab", "--log", "debug", "--connect", &world.endpoint];
+    let (_emulator, _held) = Process::unread(&args, world.path());
+    let mesh = world.join().await;
+    all_alive(&mesh, &["emulator"]).await;
+    let eyes = Eyes::of(&mesh).await;
+    // Each of them is a line of the log; all together are more than the pipe takes.
+    let stranger = Stranger::join(&world.endpoint).await;
+    for _ in 0..4000 {
+        stranger.say(KEY, "", &b"garbage"[..]);
+    }
+    let count = |state: &GateState| state.rejected.values().sum::<u64>();
+    eyes.hears("the gate has refused all of it", |state| count(state) >= 4000).await;
+    world.done(&["stop"]).await.is(0, &["r1 is stopped"]);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -167,7 +188,13 @@ async fn a_stop_during_braking_keeps_braking_and_only_one_of_two_enables_is_need
     declared(&other).await;
     while held.eyes.states.take().is_some() {}
     let state = held.eyes.hears("the gate's account", |_| true).await;
-    let enable = |by: &str| Enable { stop: state.stop, boot: state.boot, echo: state.tick, by: by.into() };
+    let enable = |by: &str| Enable {
+        stop: state.stop,
+        boot: state.boot,
+        echo: state.tick,
+        by: by.into(),
+        class: Class::Manual,
+    };
     let (robot, first, second) = (r1(), enable("one"), enable("two"));
     let ask = |mesh: Mesh, enable: Enable| {
         let robot = robot.clone();

@@ -4,6 +4,7 @@ use super::{PATIENCE, at_last, eventually};
 use nix::sys::signal::{Signal, kill, killpg};
 use nix::unistd::Pid;
 use std::fs::File;
+use std::io::{PipeReader, PipeWriter};
 use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -69,7 +70,21 @@ impl Process {
     pub(crate) fn with_env(args: &[&str], variables: &[(&str, &str)], directory: &Path) -> Self {
         Self::spawn(args, variables, None, directory)
     }
+    /// Starts the program with a stderr that nobody reads as long as the pipe is held: it takes 64 kB and no more.
+    pub(crate) fn unread(args: &[&str], directory: &Path) -> (Self, PipeReader) {
+        let (held, err) = std::io::pipe().expect("a pipe");
+        (Self::spawn_with(args, &[], None, directory, Some(err)), held)
+    }
     fn spawn(args: &[&str], variables: &[(&str, &str)], input: Option<&str>, directory: &Path) -> Self {
+        Self::spawn_with(args, variables, input, directory, None)
+    }
+    fn spawn_with(
+        args: &[&str],
+        variables: &[(&str, &str)],
+        input: Option<&str>,
+        directory: &Path,
+        stderr: Option<PipeWriter>,
+    ) -> Self {
         static NEXT: AtomicU32 = AtomicU32::new(0);
         let number = NEXT.fetch_add(1, Relaxed);
         let file = |kind: &str| directory.join(format!("{number}.{kind}"));
@@ -94,7 +109,7 @@ impl Process {
             .env("AXLE_PARENT", "stdin")
             .stdin(stdin)
             .stdout(File::create(&out).expect("a file"))
-            .stderr(File::create(&err).expect("a file"))
+            .stderr(stderr.map_or_else(|| Stdio::from(File::create(&err).expect("a file")), Stdio::from))
             .process_group(0)
             .spawn()
             .expect("the program");

@@ -30,9 +30,27 @@ pub(crate) struct Robot {
 impl Robot {
     /// Starts everything, and waits until it is alive and knows where it is.
     pub(crate) async fn new() -> Self {
+        Self::with(|world, name| world.run(name)).await
+    }
+    /// The same with parameters of its own for the navigator.
+    pub(crate) async fn navigated(params: &str) -> Self {
+        Self::with_params(&[("navigator", params)]).await
+    }
+    /// The same, with the texts of the parameter files of some services.
+    pub(crate) async fn with_params(params: &[(&str, &str)]) -> Self {
+        Self::with(|world, name| match params.iter().find(|(service, _)| *service == name) {
+            Some((_, text)) => {
+                let file = world.file(&format!("{name}.toml"), text);
+                world.tool(&["run", name, "--host", "lab", "--params", &file])
+            }
+            None => world.run(name),
+        })
+        .await
+    }
+    async fn with(start: impl Fn(&World, &'static str) -> Process) -> Self {
         let world = World::new().await;
         let router = world.router();
-        let services = SERVICES.map(|name| (name, world.run(name))).into();
+        let services = SERVICES.map(|name| (name, start(&world, name))).into();
         let mesh = world.join().await;
         all_alive(&mesh, &SERVICES).await;
         let robot = Self { router, services, mesh, world };

@@ -1,6 +1,7 @@
 //! A plain Zenoh client that knows nothing of Axle: it can say anything on any key.
 
 use super::{PATIENCE, within};
+use axle_mesh::Link;
 use axle_mesh::config::LINK;
 use axle_schema::codec::encoding_of;
 use axle_schema::{Refusal, decode};
@@ -14,6 +15,11 @@ pub(crate) struct Stranger {
 
 impl Stranger {
     pub(crate) async fn join(endpoint: &str) -> Self {
+        Self::join_as(endpoint, Link::default()).await
+    }
+
+    /// The same, with a certificate to show.
+    pub(crate) async fn join_as(endpoint: &str, link: Link) -> Self {
         let mut config = Config::default();
         let own = [
             ("mode", "\"client\"".to_owned()),
@@ -21,7 +27,7 @@ impl Stranger {
             ("connect/timeout_ms", PATIENCE.as_millis().to_string()),
         ];
         let shared = LINK.iter().map(|(key, value)| (*key, (*value).to_owned()));
-        for (key, value) in own.into_iter().chain(shared) {
+        for (key, value) in own.into_iter().chain(shared).chain(link.settings()) {
             config.insert_json5(key, &value).expect("a setting of Zenoh");
         }
         let opening = tokio::task::spawn_blocking(|| zenoh::open(config).wait());
@@ -34,6 +40,13 @@ impl Stranger {
         let put = if encoding.is_empty() { put } else { put.encoding(Encoding::from(encoding)) };
         // Block, so that a test knows that its bytes arrive: a hostile sender has all the time of the world.
         put.congestion_control(zenoh::qos::CongestionControl::Block).wait().expect("said");
+    }
+
+    /// Waits until the router has taken everything that was said so far: links keep their order, and a question that
+    /// nobody may answer comes back at once.
+    pub(crate) async fn is_heard_by_router(&self) {
+        let nothing = self.session.get("nothing/at/all").timeout(PATIENCE).await.expect("asked");
+        while within(PATIENCE * 2, "the end of no replies", nothing.recv_async()).await.is_ok() {}
     }
 
     /// Asks with these bytes, or without any, and is refused with words that hold all of these.

@@ -77,7 +77,7 @@ async fn pathfinder_answers_hostile_questions_with_refusals() {
     all_alive(&mesh, &["pathfinder"]).await;
     let stranger = Stranger::join(&world.endpoint).await;
     let key = "axle/r1/pathfinder/plan";
-    let ask = PlanAsk { way: WayTask::parse("1,0").expect("a way"), start: None };
+    let ask = PlanAsk { way: WayTask::parse("1,0").expect("a way"), ..PlanAsk::default() };
     let mut asked = asks_badly::<PlanAsk>(&stranger, key, &encode(&ask).expect("a question")).await;
 
     // A million points of seven bytes each, well formed; then a few too many; then one that is nowhere.
@@ -90,7 +90,7 @@ async fn pathfinder_answers_hostile_questions_with_refusals() {
     let far = [b"\xa2\x61x\xfb", &1e9_f64.to_be_bytes()[..], b"\x61y\x00"].concat();
     for (bytes, words) in [
         ([&b"\xa1\x61?"[..], &[0x81; 100_000]].concat(), &["nested deeper"][..]),
-        (points(1_000_000, origin), &["PlanAsk in bytes is too large", "262144"]),
+        (points(1_000_000, origin), &["PlanAsk in bytes is too large", "1310720"]),
         (points(5000, origin), &["way points is too large: 5000, at most 4096"]),
         (points(1, &nowhere), &["points[0].x", "NaN is not a finite number"]),
         (points(1, &far), &["x of way point 1 is out of range"]),
@@ -184,7 +184,7 @@ async fn leases_and_enables_of_strangers_are_refused_by_name() {
 async fn pilot_and_corrector_refuse_hostile_tasks_and_drive_the_next_good_one() {
     let robot = Robot::new().await;
     let stranger = Stranger::join(&robot.world.endpoint).await;
-    let ask = GoAsk { way: WayTask::parse("0.2,0").expect("a way"), corrector: None };
+    let ask = GoAsk { way: WayTask::parse("0.2,0").expect("a way"), corrector: None, confirm: Vec::new() };
     let fine = encode(&ask).expect("a question");
     let asked = asks_badly::<GoAsk>(&stranger, "axle/r1/pilot/go", &fine).await;
     let parrot = encode(&GoAsk { corrector: Some("parrot".into()), ..ask.clone() }).expect("a question");
@@ -226,7 +226,7 @@ async fn a_flood_of_questions_is_bounded_and_the_next_one_is_answered() {
     let server = other.server::<PlanAsk, Plan>(&key::PLAN.of_every_robot()).expect("a server");
     let visible = other.become_visible().expect("visible");
     all_alive(&mesh, &["pathfinder"]).await;
-    let ask = PlanAsk { way: WayTask::parse("1,0").expect("a way"), start: None };
+    let ask = PlanAsk { way: WayTask::parse("1,0").expect("a way"), ..PlanAsk::default() };
     // Nobody answers yet: so many may wait, and whoever comes after them is told at once that nobody is free.
     let asking: Vec<_> = (0..400)
         .map(|_| {

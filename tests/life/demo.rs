@@ -85,7 +85,9 @@ async fn the_demo_says_all_that_is_promised_as_json() {
         let pid = process["pid"].as_u64().expect("each has run as a process");
         assert!(!is_alive(u32::try_from(pid).expect("a pid")), "{process} is gone");
         let service = process["service"].as_str().expect("a name");
-        assert!(service == "router" || json["messages"][service]["refused"] == 0, "{service}: {json}");
+        // A gate refuses commands that come too late, as they do where beats are late: it is right then.
+        let may_refuse = service == "router" || (service == "emulator" && json["late_beats"] != 0);
+        assert!(may_refuse || json["messages"][service]["refused"] == 0, "{service}: {json}");
     }
     let (chart, recording) =
         (json["chart"].as_str().expect("a path"), json["recording"].as_str().expect("a path"));

@@ -1,6 +1,6 @@
 //! `axle doctor --self`: what the healthcheck of a container finds.
 
-use crate::harness::{World, all_alive};
+use crate::harness::{PATIENCE, World, all_alive, within};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_doctor_finds_healthy_what_answers_and_says_why_something_is_not() {
@@ -11,6 +11,17 @@ async fn a_doctor_finds_healthy_what_answers_and_says_why_something_is_not() {
     let mesh = world.join().await;
     let (_pathfinder, pilot) = (world.run("pathfinder"), world.run("pilot"));
     all_alive(&mesh, &["pathfinder", "pilot"]).await;
+    // A process that has just begun has not had a beat yet.
+    let beats = async {
+        loop {
+            let everybody = mesh.everybody(PATIENCE).await.expect("an answer");
+            let mut known = everybody.into_iter().filter_map(|(_, status)| status);
+            if known.any(|status| status.service == "pilot" && status.beats > 0) {
+                return;
+            }
+        }
+    };
+    within(PATIENCE, "the pilot has a beat", beats).await;
     for (service, words) in
         [("router", "between two sessions"), ("pathfinder", "of its trade"), ("pilot", "its beat goes on")]
     {

@@ -126,7 +126,7 @@ async fn a_topology_that_lacks_something_is_refused_by_check_and_told_by_up() {
     );
     let file = world.file("half.toml", &text);
     let checked = world.axle(&["check", &file]).ended().await;
-    checked.is(1, &["1 of its wires are wrong or missing"]);
+    checked.is(1, &["2 of its wires are wrong or missing"]);
     assert!(checked.out.contains("navigator of r1 needs source/recent, which nobody says; add source"));
     let up = world.axle(&["up", &file]);
     up.says("navigator of r1 needs source/recent").await;

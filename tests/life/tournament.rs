@@ -89,7 +89,8 @@ async fn tuned_parameters_are_a_file_that_the_service_takes_or_say_what_is_wrong
     let ended = world.axle(&args).ended().await;
     ended.is(0, &["try 1: pole"]);
     assert!(
-        ended.out.starts_with("# d-corrector, tuned by `axle tournament --tune d-corrector"),
+        ended.out.starts_with("# d-corrector: pole ")
+            && ended.out.contains("found by `axle tournament --tune d-corrector"),
         "{}",
         ended.out
     );

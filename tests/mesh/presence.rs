@@ -50,8 +50,9 @@ async fn two_processes_of_one_service_are_two_and_a_strange_host_name_does_no_ha
             service: "navigator".into(),
             robot: "r1".into(),
             inputs: Vec::new(),
+            link: axle_mesh::Link::default(),
         };
-        let mesh = axle_mesh::Mesh::join(settings, axle_mesh::Patience::AtMost(PATIENCE), |_| {}).await;
+        let mesh = axle_mesh::Mesh::join(settings, axle_mesh::Patience::AtMost(PATIENCE), |_, _| {}).await;
         let mesh = mesh.expect("a router");
         let visible = mesh.become_visible().expect("visible");
         meshes.push((mesh, visible));

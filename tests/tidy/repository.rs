@@ -50,11 +50,11 @@ impl Repository {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         let mut paths = Vec::new();
         walk(&root, &mut paths);
-        let files = paths.iter().filter_map(|path| {
-            // Files that are no text have no rules.
-            let text = String::from_utf8(std::fs::read(path).expect("a file")).ok()?;
+        let files = paths.iter().map(|path| {
+            // Files that are no text, such as pictures, are there for links only.
+            let text = String::from_utf8(std::fs::read(path).expect("a file")).unwrap_or_default();
             let inside = path.strip_prefix(&root).expect("below the root");
-            Some(File::new(&inside.to_str().expect("a path in UTF-8").replace('\\', "/"), &text))
+            File::new(&inside.to_str().expect("a path in UTF-8").replace('\\', "/"), &text)
         });
         let mut files: Vec<File> = files.collect();
         files.sort_by(|a, b| a.path.cmp(&b.path));
