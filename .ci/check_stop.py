@@ -16,6 +16,8 @@ if not 0 < result["brake_ms"]["max"] <= 300:
     wrong.append(f"a fault took {result['brake_ms']['max']} ms to braking")
 if not 0 < result["gate_command_us"] <= 50:
     wrong.append(f"the gate costs a command {result['gate_command_us']} µs")
+if result["commands_unjudged"] > result["commands_judged"] / 100:
+    wrong.append(f"{result['commands_unjudged']} commands could not be judged")
 if result["commands_judged"] < 60:
     wrong.append(f"only {result['commands_judged']} commands were judged")
 if wrong:

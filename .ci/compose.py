@@ -16,6 +16,7 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 
@@ -118,7 +119,7 @@ class Tap:
 class Mesh:
     """The containers of one run, and the program on the host."""
 
-    def __init__(self, axle, image):
+    def __init__(self, axle, image, keys=None):
         self.axle, self.project = str(axle), f"axle-ci-{os.getpid()}"
         if shutil.which("docker-compose"):
             self.compose_command = ["docker-compose"]
@@ -131,6 +132,11 @@ class Mesh:
             os.environ, COMPOSE_PROJECT_NAME=self.project, COMPOSE_PROFILES="sim", AXLE_IMAGE=image,
             AXLE_PORT=str(port), AXLE_CONNECT=f"tcp/127.0.0.1:{port}", NO_COLOR="1",
         )
+        if keys:
+            self.environment |= {
+                "COMPOSE_FILE": "docker-compose.yml:docker-compose.secure.yml", "AXLE_KEYS": str(keys),
+                "AXLE_IDENTITY": str(keys / "bob"),
+            }
         self.image = image
         self.taps = []
 
@@ -341,12 +347,46 @@ def play(mesh):
     print(json.dumps({name: round(value, 3) for name, value in measured.items()}))
 
 
+def make_keys(axle, keys):
+    """An authority, an identity for each container that its user can read, an operator and a viewer."""
+    issue = [str(axle), "keys", "issue", "--keys", str(keys), "--topology", "deploy/topologies/compose.toml"]
+    must([str(axle), "keys", "init", "--keys", str(keys)])
+    must(issue)
+    must([*issue, "bob", "--role", "operator"])
+    must([*issue, "ann", "--role", "viewer"])
+    for identity in keys.glob("*@*"):
+        for path in [identity, *identity.iterdir()]:
+            os.chown(path, 10001, 10001)
+
+
+def play_secured(mesh):
+    """The same mesh with certificates: an operator drives, a viewer looks, and a stranger gets no link."""
+    healthy = come_up(mesh)
+    mesh.everybody()
+    missed = drive(mesh, "0.5,0", NEAR)
+    ann = mesh.environment | {"AXLE_IDENTITY": mesh.environment["AXLE_IDENTITY"].replace("/bob", "/ann")}
+    must([mesh.axle, "tap", "axle/r1/navigator/pose", "--count", "1"], ann, 20)
+    stop = run([mesh.axle, "stop"], ann)
+    demand(stop.returncode == 1 and "ann (viewer)" in stop.stderr, f"a viewer stopped the robot: {stop.stderr}")
+    nobody = run([mesh.axle, "ps"], {name: value for name, value in ann.items() if name != "AXLE_IDENTITY"})
+    demand(nobody.returncode == 1 and "it wants TLS" in nobody.stderr, f"a stranger got in: {nobody}")
+    print(json.dumps({"secured_healthy_s": round(healthy, 3), "secured_missed_cm": round(missed * 100, 3)}))
+
+
 def main():
     axle, image = pathlib.Path(sys.argv[1]).resolve(), sys.argv[2]
     signal.signal(signal.SIGTERM, lambda *_: sys.exit("ended by SIGTERM"))
-    mesh = Mesh(axle, image)
+    with tempfile.TemporaryDirectory(prefix="axle-keys-") as directory:
+        keys = pathlib.Path(directory) / "keys"
+        make_keys(axle, keys)
+        tried(Mesh(axle, image), play)
+        tried(Mesh(axle, image, keys), play_secured)
+
+
+def tried(mesh, plays):
+    """Plays, and takes down whatever came of it."""
     try:
-        play(mesh)
+        plays(mesh)
     except (Failure, subprocess.TimeoutExpired, KeyError, ValueError) as failure:
         print(mesh.logs(), file=sys.stderr)
         sys.exit(f"compose: {failure!r}" if not isinstance(failure, Failure) else f"compose: {failure}")

@@ -19,7 +19,10 @@ ROUTER = "axle-router"
 SHELL = "axle"
 # Every other crate of the workspace is an algorithm: it may use the words, and these crates beside them.
 ALGORITHMS_MAY_USE = {
-    "axle-emulator": {"axle-gate"},
+    # Maps stand in the way of whoever plans and of whoever drives.
+    "axle-emulator": {"axle-gate", "axle-maps", "axle-robot"},
+    "axle-pathfinder": {"axle-maps"},
+    "axle-robot": {"axle-gate"},
     # The simulator joins the others in virtual time; none of them knows it.
     "axle-sim": {
         "axle-correctors",
@@ -36,7 +39,7 @@ FORBIDDEN_BELOW = {"zenoh", "tokio", "mio", "async-std", "smol", "socket2", "ran
 MAY_NAME_ZENOH = {MESH, ROUTER}
 # The whole-system tests play strangers, who send what no part of Axle would send.
 TESTS_MAY_NAME_ZENOH = MAY_NAME_ZENOH | {SHELL}
-ZENOH_FEATURES = {"transport_tcp"}
+ZENOH_FEATURES = {"transport_tcp", "transport_tls"}
 
 
 def metadata(root, *flags):
@@ -111,7 +114,7 @@ BROKEN = [
     ("services/pilot", DEPENDENCIES, "axle-mesh.workspace = true", "axle-pilot depends on axle-mesh"),
     ("services/navigator", DEPENDENCIES, "axle-pathfinder.workspace = true", "axle-navigator depends on axle-pathfinder"),
     ("services/mesh", DEPENDENCIES, "axle-gate.workspace = true", "axle-mesh depends on axle-gate"),
-    ("", '"transport_tcp"', '"transport_compression"', "zenoh's features are ['transport_compression', 'tr"),
+    ("", '"transport_tcp", "transport_tls"', '"transport_compression"', "zenoh's features are ['transport_compression', 'tr"),
     ("services/mesh", "zenoh.workspace = true", 'zenoh = { workspace = true, features = ["internal"] }', "['internal', 'tr"),
 ]
 

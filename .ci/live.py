@@ -185,4 +185,5 @@ def main():
         end_mesh(up, log)
 
 
-main()
+if __name__ == "__main__":
+    main()
