@@ -1,7 +1,7 @@
 //! Who may move the wheels: leases, AllStop and enable.
 
 use crate::Gate;
-use crate::gate::{Held, Permit, SILENT_PERIODS};
+use crate::gate::{Held, LONGEST_SILENCE, Permit, SHORTEST_SILENCE, SILENT_PERIODS};
 use axle_schema::codec::Message;
 use axle_schema::command::{BrakeCause, Class, Enable, Lease, LeaseAsk, Release};
 use axle_schema::{Boot, Refusal, Seconds, StopId, Tick};
@@ -31,7 +31,7 @@ impl Gate {
         if let Some(cause) = cause {
             self.end_lease(cause);
         }
-        let silence_stop = Seconds((SILENT_PERIODS * ask.period.0).clamp(0.15, 0.5));
+        let silence_stop = (ask.period * SILENT_PERIODS).max(SHORTEST_SILENCE).min(LONGEST_SILENCE);
         self.epoch = epoch;
         self.seq = None;
         self.held = Some(Held { holder: ask.holder.clone(), class: ask.class, silence_stop, heard: now });

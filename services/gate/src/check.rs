@@ -91,11 +91,13 @@ impl Gate {
 
     fn follow(&mut self, now: Seconds, command: &Command) {
         self.seq = Some(command.seq);
-        if let Some(held) = &mut self.held {
-            held.heard = now;
-        }
+        let Some(held) = &mut self.held else { return };
+        held.heard = now;
+        let silence_stop = held.silence_stop;
         let lasts = command.dwm.duration().min(Seconds(f64::from(command.ttl_ms) / 1000.0));
-        self.course = Some(Course { dwm: command.dwm, since: now, lasts });
+        let age = Seconds(f64::from(Tick::of(now).since(command.echo)) / 1000.0);
+        let until = self.until(now, lasts, age, silence_stop);
+        self.course = Some(Course { dwm: command.dwm, since: now, lasts, until });
     }
 }
 

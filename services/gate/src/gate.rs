@@ -76,10 +76,14 @@ pub(crate) struct Course {
     pub(crate) since: Seconds,
     /// How much of it counts: its duration, or less when its sender said so.
     pub(crate) lasts: Seconds,
+    /// From when on it moves nothing more.
+    pub(crate) until: Seconds,
 }
 
 /// Periods of silence after which the wheels brake (fault model, 3.5: 2.5 periods, within 150 to 500 ms).
 pub(crate) const SILENT_PERIODS: f64 = 2.5;
+pub(crate) const SHORTEST_SILENCE: Seconds = Seconds(0.15);
+pub(crate) const LONGEST_SILENCE: Seconds = Seconds(0.5);
 
 impl Gate {
     /// The gate of a robot after a boot, with standing wheels and without a holder.
@@ -129,7 +133,7 @@ impl Gate {
         self.arrived = 0;
         // The end of a movement is judged here and not at every event, so that a next command that comes in time for
         // the beat finds the last one still running.
-        if self.course.as_ref().is_some_and(|course| course.is_over(now, self.params.grace)) {
+        if self.course.as_ref().is_some_and(|course| now >= course.until) {
             self.course = None;
             if !at_rest(self.wheels) {
                 self.cause = Some(BrakeCause::Expired);
@@ -181,6 +185,16 @@ impl Gate {
         if self.seq.is_some() { silence_stop } else { silence_stop.max(self.params.max_age + period) }
     }
 
+    /// Until when a movement moves the wheels that is obeyed now, lasts so long, and was asked for on news of this age:
+    /// through the time that its last speed is held, but no longer than that news may be echoed (fault matrix, row 8).
+    ///
+    /// Otherwise a command on news that is all but too old would drive on when all of it is. A holder who may be silent for
+    /// longer than the shortest silence comes less often; the news that moves the wheels may be older by as much.
+    pub(crate) fn until(&self, now: Seconds, lasts: Seconds, age: Seconds, silence_stop: Seconds) -> Seconds {
+        let news = self.params.max_age + (silence_stop - SHORTEST_SILENCE) - age;
+        now + (lasts + self.params.grace).min(news)
+    }
+
     /// Ends the lease and the movement that it gave; the beats brake from now on.
     pub(crate) fn end_lease(&mut self, cause: BrakeCause) {
         self.held = None;
@@ -190,11 +204,6 @@ impl Gate {
 }
 
 impl Course {
-    /// Whether the movement, and the time that its last speed is held, are over.
-    fn is_over(&self, now: Seconds, grace: Seconds) -> bool {
-        let running = now < self.since + self.lasts + grace;
-        !running
-    }
     /// The speeds that it asks for; the last ones of what counts are held.
     fn speeds_at(&self, now: Seconds) -> Sides<MetresPerSecond> {
         self.dwm.speeds_at((now - self.since).min(self.lasts))
@@ -214,6 +223,7 @@ impl Course {
 mod tests {
     use super::*;
     use crate::rig::{Rig, ask, drive};
+    use axle_schema::Tick;
     use axle_schema::command::{Command, LeaseAsk, Motion};
 
     #[test]
@@ -248,6 +258,37 @@ mod tests {
         assert!((rig.beats(0.06).left.0 - 0.04).abs() < 1e-9);
         rig.beats(0.015);
         assert_eq!(rig.gate.motion(), Motion::Braking);
+    }
+
+    #[test]
+    fn news_drives_no_longer_than_it_may_be_echoed() {
+        // A command may come 250 ms after what it echoes. Who comes every 200 ms may be silent for 500 ms instead of 150.
+        for (period, age, drives) in
+            [(0.05, 0.1, 0.1), (0.05, 0.2, 0.05), (0.05, 0.249, 0.001), (0.2, 0.2, 0.25)]
+        {
+            let mut rig = Rig::enabled();
+            rig.now = Seconds(1.0);
+            let ask = LeaseAsk { period: Seconds(period), ..ask("a", Class::Corrector) };
+            let lease = rig.gate.lease(rig.now, &ask).expect("a lease");
+            let echo = Tick::of(rig.now);
+            rig.now += Seconds(age);
+            let command = Command { echo, ..rig.next(&lease, drive(0.2, 0.2, period)) };
+            rig.gate.obey(rig.now, &command).expect("obeyed");
+            let from = rig.now;
+            for ms in 0..500_u32 {
+                rig.now = from + Seconds(f64::from(ms) / 1000.0);
+                rig.gate.beat(rig.now);
+                if rig.gate.motion() != Motion::Driving {
+                    break;
+                }
+            }
+            let drove = rig.now - from;
+            assert!(
+                (drove.0 - drives).abs() < 2e-3,
+                "news of {age} s ago drove for {drove}, not for {drives} s"
+            );
+            assert_eq!(rig.gate.state(rig.now).cause, Some(BrakeCause::Expired));
+        }
     }
 
     #[test]

@@ -63,6 +63,8 @@ struct History {
     seq: u32,
     /// Epoch, sequence number and time of the latest command that was obeyed.
     obeyed: Option<(u32, u32, Seconds)>,
+    /// The time of the robot that it echoes.
+    news: Seconds,
     stop: Option<StopId>,
     /// Since when nobody may move the wheels.
     forbidden: Option<Seconds>,
@@ -78,6 +80,7 @@ impl History {
             leases: Vec::new(),
             seq: 0,
             obeyed: None,
+            news: Seconds::ZERO,
             stop: None,
             forbidden: None,
             speeds: Sides::default(),
@@ -167,6 +170,7 @@ impl History {
                 assert!(epoch < command.epoch || seq < command.seq, "sequence numbers grow");
             }
             self.obeyed = Some((command.epoch, command.seq, self.now));
+            self.news = self.now - Seconds(f64::from(late_ms) / 1000.0);
         }
     }
 
@@ -179,6 +183,9 @@ impl History {
             assert!(new.abs().0 <= 1.0 + 1e-6);
         }
         self.speeds = speeds;
+        // The echo counts in milliseconds.
+        let news = self.now - self.news;
+        assert!(self.gate.motion() != Motion::Driving || news.0 < 0.251, "driven by news of {news} ago");
         // Braking from 1 m/s at 2 m/s² takes 0.5 s; a beat may come late by the longest beat.
         let braked = |since: Seconds| (self.now - since).0 > 0.5 + MAX_BEAT.0 + 1e-9;
         if self.forbidden.is_some_and(braked) {
