@@ -34,7 +34,7 @@ mod table;
 pub use board::{BATTERY, BOARD, CONTACTS, SERVOS};
 pub use port::Port;
 pub use table::TABLE;
-use table::readers;
+use table::READERS;
 
 /// The first chunk of every key.
 const ROOT: &str = "axle";
@@ -445,7 +445,7 @@ fn find_port(service: &str, name: &str) -> Option<&'static Entry> {
 /// Whether this program reads samples of this schema, for example `axle.Dwm.v1`.
 #[must_use]
 pub fn knows(schema: &str) -> bool {
-    readers().any(|(name, _)| name() == schema)
+    READERS.contains_key(schema)
 }
 
 /// Decodes a sample into JSON by the schema that its encoding names, or else by its key.
@@ -455,7 +455,7 @@ pub fn knows(schema: &str) -> bool {
 pub fn to_json(key: &str, encoding: &str, bytes: &[u8]) -> Result<serde_json::Value, Refusal> {
     let named = encoding.split_once(';').map(|(_, schema)| schema).filter(|schema| !schema.is_empty());
     let reader = match named {
-        Some(schema) => readers().find(|(name, _)| name() == schema).map(|(_, reader)| reader),
+        Some(schema) => READERS.get(schema).copied(),
         None => find(key).map(|entry| entry.json),
     };
     let Some(reader) = reader else {

@@ -353,6 +353,12 @@ fn a_sample_that_says_it_is_another_message_is_refused() {
     for (encoding, got) in [
         ("application/cbor;axle.EncodersData.v1", "axle.EncodersData.v1"),
         ("application/cbor;axle.Dwm.v2", "axle.Dwm.v2"),
+        ("application/cbor;axle.Dwm.v01", "axle.Dwm.v01"),
+        ("application/cbor;axle.Dwm.v+1", "axle.Dwm.v+1"),
+        ("application/cbor;axle.Dwm.v", "axle.Dwm.v"),
+        ("application/cbor;axle.Dwm.v1 ", "axle.Dwm.v1 "),
+        ("application/cbor;Dwm.v1", "Dwm.v1"),
+        ("application/cbor;axle.DwmX.v1", "axle.DwmX.v1"),
         ("application/json;x", "x"),
     ] {
         let refusal = decode_as::<Dwm>(encoding, &dwm).expect_err(encoding);

@@ -1,6 +1,8 @@
 //! The table of all keys: what is generated from keys, and what reads them, goes through it.
 
 use super::*;
+use std::collections::HashMap;
+use std::sync::LazyLock;
 
 /// All keys, in the order of the way of a task.
 pub const TABLE: &[Entry] = &[
@@ -88,7 +90,8 @@ const MORE_TYPES: &[Reader] = &[
     (schema_of::<SetLog>, json::<SetLog>),
 ];
 
-/// Every schema that this program reads, and how.
-pub(super) fn readers() -> impl Iterator<Item = (fn() -> String, ToJson)> {
-    TABLE.iter().map(|entry| (entry.carries, entry.json)).chain(MORE_TYPES.iter().copied())
-}
+/// Every schema that this program reads, and how. Taps look into it for every sample, so its names are made once.
+pub(super) static READERS: LazyLock<HashMap<String, ToJson>> = LazyLock::new(|| {
+    let of_keys = TABLE.iter().map(|entry| (entry.carries, entry.json));
+    of_keys.chain(MORE_TYPES.iter().copied()).map(|(name, reader)| (name(), reader)).collect()
+});
