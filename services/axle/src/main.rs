@@ -31,10 +31,10 @@ mod why;
 
 use clap::Parser as _;
 use std::process::ExitCode;
-
-/// By how much the priority of those who only look on is lowered, of at most 19: fifty taps on the two cores of a robot
-/// are then hardly felt by its commands.
-const COURTESY: i32 = 15;
+use thread_priority::{
+    NormalThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy, set_thread_priority_and_policy,
+    thread_native_id,
+};
 
 fn main() -> ExitCode {
     let cli = cli::Cli::parse();
@@ -57,10 +57,14 @@ fn main() -> ExitCode {
     }
 }
 
-/// Lets whoever drives have the processor first. All threads that are started later inherit it, so it comes before them.
+/// Leaves the processor to whoever drives: who only looks on takes what nobody else wants, and stands back at once when
+/// somebody does. A lower priority alone would let each of fifty taps finish its slice before a command is passed on.
+///
+/// All threads that are started later inherit it, so it comes before them.
 fn give_way() {
+    let idle = ThreadSchedulePolicy::Normal(NormalThreadSchedulePolicy::Idle);
     // A system that refuses takes nothing but this courtesy.
-    if let Err(fault) = rustix::process::nice(COURTESY) {
-        tracing::debug!("cannot lower the own priority: {fault}");
+    if let Err(fault) = set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Min, idle) {
+        tracing::debug!("cannot leave the processor to others: {fault}");
     }
 }

@@ -15,15 +15,18 @@ use zenoh::Config;
 /// The receiver of a lease is the other side, hence the same on both. `max_message_size` is above the largest message
 /// of Axle, so that an oversized one arrives and is refused by name, and below what would hurt. An express message takes
 /// a place of the queue alone; with the usual two places a link whose sender waits for a processor for a few
-/// milliseconds drops measurements, which a recording then lacks.
+/// milliseconds drops measurements, which a recording then lacks. Of `buffer_size` a link has four buffers to receive into;
+/// with the usual one it makes, and clears, a new buffer of 64 KiB for every message that comes while one is still held.
 pub const LINK: &[(&str, &str)] = &[
     ("scouting/multicast/enabled", "false"),
     ("scouting/gossip/enabled", "false"),
     ("transport/link/tx/lease", "1000"),
     ("transport/link/tx/keep_alive", "4"),
     ("transport/link/tx/queue/congestion_control/block/wait_before_close", "500000"),
+    ("transport/link/tx/queue/batching/time_limit", "0"),
     ("transport/link/tx/queue/size/interactive_high", "16"),
     ("transport/link/tx/queue/size/data", "16"),
+    ("transport/link/rx/buffer_size", "262144"),
     ("transport/link/rx/max_message_size", "16777216"),
     ("transport/unicast/open_timeout", "1000"),
     ("transport/unicast/accept_timeout", "1000"),

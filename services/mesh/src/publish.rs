@@ -46,8 +46,8 @@ impl Mesh {
             .encoding(Encoding::APPLICATION_CBOR.with_schema(schema_of::<M>()))
             .priority(priority(key.urgency()))
             .congestion_control(CongestionControl::Drop)
-            // Batching would hold a command or a measurement back for a millisecond.
-            .express(!matches!(key.urgency(), Urgency::Report))
+            // What is said at one beat may travel together; a command goes alone.
+            .express(matches!(key.urgency(), Urgency::Command))
             .wait()
             .map_err(|source| Fault::Declare { key: key.to_string(), source })?;
         self.counters.note_says(key.as_str());
