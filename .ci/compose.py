@@ -2,8 +2,9 @@
 
 Under a project name and on a port of its own: waits until every container is healthy, drives the square from the host,
 cuts the link between the two networks in mid task and looks from the robot's side whether the wheels stop, heals it,
-and drives home without any process having been started anew. What is waited for is a condition with a deadline. What
-was started is taken down, also when something fails; then the logs are printed first.
+and drives home without any process having been started anew. Then the same with certificates, and with a board on a
+serial line in the place of the emulated robot. What is waited for is a condition with a deadline. What was started is
+taken down, also when something fails; then the logs are printed first.
 """
 
 import json
@@ -147,18 +148,24 @@ class Tap:
         self.process.wait()
 
 
+def free_port():
+    """A port of this machine on which nobody listens."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return free.getsockname()[1]
+
+
 class Mesh:
     """The containers of one run, and the program on the host."""
 
-    def __init__(self, axle, image, keys=None):
+    def __init__(self, axle, image, keys=None, board=None):
         self.axle, self.project = str(axle), f"axle-ci-{os.getpid()}"
+        self.services = SERVICES | ({"onboard": {"robot", "source", "navigator"}} if board else {})
         if shutil.which("docker-compose"):
             self.compose_command = ["docker-compose"]
         else:
             self.compose_command = ["docker", "compose"]
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            port = free.getsockname()[1]
+        port = free_port()
         self.environment = dict(
             os.environ, COMPOSE_PROJECT_NAME=self.project, COMPOSE_PROFILES="sim", AXLE_IMAGE=image,
             AXLE_PORT=str(port), AXLE_CONNECT=f"tcp/127.0.0.1:{port}", NO_COLOR="1",
@@ -168,6 +175,8 @@ class Mesh:
                 "COMPOSE_FILE": "docker-compose.yml:docker-compose.secure.yml", "AXLE_KEYS": str(keys),
                 "AXLE_IDENTITY": str(keys / "bob"),
             }
+        if board:
+            self.environment |= board.environment
         self.image = image
         self.taps = []
         self.witness = Witness()
@@ -212,7 +221,7 @@ class Mesh:
 
     def everybody(self):
         """The same, once all are there."""
-        wanted = {(host, service) for host, services in SERVICES.items() for service in services}
+        wanted = {(host, service) for host, services in self.services.items() for service in services}
         return await_("all services answer on the host", lambda: (b := self.boots()).keys() >= wanted and b, 20)
 
     def logs(self):
@@ -229,6 +238,51 @@ class Mesh:
         demand(done.returncode == 0 and not left, f"the compose did not come down, {left} are left:\n{done.stderr}")
 
 
+class Board:
+    """An emulated board on a terminal of this machine, which the profile `real` takes for a board on a serial port.
+
+    A terminal is no device that Docker could pass on, for it is known by its place in /dev/pts only. So the port that
+    docker-compose.yml passes on is one that is there on every machine, and the terminal is mounted beside it."""
+
+    KIND = "dwm-text"
+    PORT = "/dev/null"
+
+    def __init__(self, axle, directory):
+        self.axle, self.link, self.processes = str(axle), directory / "board", []
+        self.listen = f"tcp/127.0.0.1:{free_port()}"
+        override = directory / "board.yml"
+        self.environment = {
+            "COMPOSE_PROFILES": "real", "AXLE_BOARD": self.KIND, "AXLE_SERIAL": self.PORT,
+            "COMPOSE_FILE": f"docker-compose.yml:{override}",
+        }
+        self.override = override
+
+    def plug_in(self, mesh):
+        """Starts it, with a router of its own: through that it says where its robot really is, once the mesh is up."""
+        router = ["router", "--listen", self.listen, "--link", mesh.environment["AXLE_CONNECT"]]
+        board = ["run", "emulator", "--board", self.KIND, "--port", str(self.link), "--robot", "r1"]
+        for command in (router, [*board, "--connect", self.listen]):
+            environment = {name: value for name, value in mesh.environment.items() if name != "AXLE_CONNECT"}
+            environment["AXLE_LOG"] = "error"
+            self.processes.append(
+                subprocess.Popen(
+                    [self.axle, *command], env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL
+                )
+            )
+        await_("the board has a terminal", self.link.exists, 10)
+        terminal = self.link.resolve()
+        # The user of the container is no user of this machine.
+        terminal.chmod(0o666)
+        robot = {"volumes": [f"{terminal}:/dev/board"], "environment": {"AXLE_PORT": "/dev/board"}}
+        # YAML, of which JSON is a part.
+        self.override.write_text(json.dumps({"services": {"robot": robot}}))
+
+    def unplug(self):
+        for process in self.processes:
+            process.kill()
+            process.wait()
+
+
 def state_of(container):
     return container["State"].get("Health", {}).get("Status", container["State"]["Status"])
 
@@ -238,7 +292,7 @@ def come_up(mesh):
     mesh.compose("config", "--quiet")
     begun = time.monotonic()
     mesh.compose("up", "--detach")
-    wanted = ROUTERS | SERVICES["workstation"] | SERVICES["onboard"]
+    wanted = ROUTERS.union(*mesh.services.values())
 
     def look():
         containers = mesh.inspect()
@@ -416,6 +470,23 @@ def play_secured(mesh):
     print(json.dumps({"secured_healthy_s": round(healthy, 3), "secured_missed_cm": round(missed * 100, 3)}))
 
 
+def play_real(mesh, board):
+    """The profile `real`: its robot starts disabled, drives once it is enabled, and rests when its board is gone."""
+    board.plug_in(mesh)
+    healthy = come_up(mesh)
+    mesh.everybody()
+    devices = [device["PathOnHost"] for device in mesh.inspect()["robot"]["HostConfig"]["Devices"]]
+    demand(devices == [board.PORT], f"the robot has the devices {devices}")
+    refused = run([mesh.axle, "go", "0.5,0"], mesh.environment)
+    demand(refused.returncode == 1 and "axle enable" in refused.stderr, f"it drives without being enabled: {refused}")
+    mesh.host("enable")
+    missed = drive(mesh, "0.5,0", NEAR)
+    board.unplug()
+    await_("the gate disables the wheels of a board that is gone",
+           lambda: not mesh.one("axle/r1/gate/state")["enabled"], 10)
+    print(json.dumps({"real_healthy_s": round(healthy, 3), "real_missed_cm": round(missed * 100, 3)}))
+
+
 def main():
     axle, image = pathlib.Path(sys.argv[1]).resolve(), sys.argv[2]
     signal.signal(signal.SIGTERM, lambda *_: sys.exit("ended by SIGTERM"))
@@ -424,6 +495,11 @@ def main():
         make_keys(axle, keys)
         tried(Mesh(axle, image), play)
         tried(Mesh(axle, image, keys), play_secured)
+        board = Board(axle, pathlib.Path(directory))
+        try:
+            tried(Mesh(axle, image, board=board), lambda mesh: play_real(mesh, board))
+        finally:
+            board.unplug()
 
 
 def tried(mesh, plays):

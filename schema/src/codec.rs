@@ -102,7 +102,8 @@ pub fn decode_as<M: Message>(encoding: &str, bytes: &[u8]) -> Result<M, Refusal>
 
 /// Whether a schema is the one of `M`; without writing that down, since it is asked for every message.
 fn names<M: Message>(schema: &str) -> bool {
-    let version = schema.strip_prefix("axle.").and_then(|name| name.strip_prefix(M::NAME)?.strip_prefix(".v"));
+    let version =
+        schema.strip_prefix("axle.").and_then(|name| name.strip_prefix(M::NAME)?.strip_prefix(".v"));
     version.is_some_and(|version| !version.starts_with(['+', '0']) && version.parse() == Ok(M::VERSION))
 }
 

@@ -33,8 +33,8 @@ mod port;
 mod table;
 pub use board::{BATTERY, BOARD, CONTACTS, SERVOS};
 pub use port::Port;
-pub use table::TABLE;
 use table::READERS;
+pub use table::TABLE;
 
 /// The first chunk of every key.
 const ROOT: &str = "axle";

@@ -24,6 +24,9 @@ use tokio::time::Instant;
 
 /// A process that does not answer within this time is silent.
 const PATIENCE: Duration = Duration::from_millis(700);
+/// A router carries a question and its answer within this time, on a computer that is busy too: whoever is judged by this
+/// is started anew, and with a router all of its links are lost.
+const CARRIED: Duration = Duration::from_secs(2);
 /// A planner has this long for a question that takes microseconds.
 const DEADLINE: Duration = Duration::from_secs(1);
 /// The slowest beat of Axle is 5 Hz: one that has not come for so long will not come.
@@ -62,7 +65,7 @@ async fn router(settings: &Settings) -> anyhow::Result<String> {
     let (answering, asking) = (settings.join("doctor").await?, settings.join("doctor").await?);
     let visible = answering.become_visible()?;
     let robot = settings.robot.as_ref().map_or(id::ALL, RobotId::as_str);
-    let doctors = asking.processes_of(robot, "doctor", PATIENCE).await?;
+    let doctors = asking.processes_of(robot, "doctor", CARRIED).await?;
     let is_carried =
         doctors.iter().any(|(presence, status)| presence.boot == answering.boot() && status.is_some());
     drop(visible);
@@ -70,7 +73,7 @@ async fn router(settings: &Settings) -> anyhow::Result<String> {
     asking.leave().await;
     anyhow::ensure!(
         is_carried,
-        "the router at {} takes connections but carried no answer within {PATIENCE:?}; restart it",
+        "the router at {} takes connections but carried no answer within {CARRIED:?}; restart it",
         settings.connect.join(", ")
     );
     Ok("it carries questions and answers between two sessions".into())
