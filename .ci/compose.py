@@ -158,7 +158,7 @@ def free_port():
 class Mesh:
     """The containers of one run, and the program on the host."""
 
-    def __init__(self, axle, image, keys=None, board=None):
+    def __init__(self, axle, image, witness, keys=None, board=None):
         self.axle, self.project = str(axle), f"axle-ci-{os.getpid()}"
         self.services = SERVICES | ({"onboard": {"robot", "source", "navigator"}} if board else {})
         if shutil.which("docker-compose"):
@@ -179,7 +179,7 @@ class Mesh:
             self.environment |= board.environment
         self.image = image
         self.taps = []
-        self.witness = Witness()
+        self.witness = witness
 
     def compose(self, *args, patience=120):
         return must([*self.compose_command, *args], self.environment, patience)
@@ -472,7 +472,6 @@ def play_secured(mesh):
 
 def play_real(mesh, board):
     """The profile `real`: its robot starts disabled, drives once it is enabled, and rests when its board is gone."""
-    board.plug_in(mesh)
     healthy = come_up(mesh)
     mesh.everybody()
     devices = [device["PathOnHost"] for device in mesh.inspect()["robot"]["HostConfig"]["Devices"]]
@@ -493,11 +492,14 @@ def main():
     with tempfile.TemporaryDirectory(prefix="axle-keys-") as directory:
         keys = pathlib.Path(directory) / "keys"
         make_keys(axle, keys)
-        tried(Mesh(axle, image), play)
-        tried(Mesh(axle, image, keys), play_secured)
-        board = Board(axle, pathlib.Path(directory))
+        witness, board = Witness(), Board(axle, pathlib.Path(directory))
+        tried(Mesh(axle, image, witness), play)
+        tried(Mesh(axle, image, witness, keys=keys), play_secured)
+        mesh = Mesh(axle, image, witness, board=board)
         try:
-            tried(Mesh(axle, image, board=board), lambda mesh: play_real(mesh, board))
+            # The compose cannot come up, nor down, without the file that this writes.
+            board.plug_in(mesh)
+            tried(mesh, lambda mesh: play_real(mesh, board))
         finally:
             board.unplug()
 
