@@ -12,7 +12,8 @@ use serde::{Deserialize, Serialize};
 #[serde(default, deny_unknown_fields)]
 pub struct GateParams {
     /// The oldest echo of the robot's clock that a command may carry, 0.05 to 1 s. It bounds how old the measurements
-    /// are that a command was computed from, network both ways included.
+    /// are that a command was computed from, network both ways included, and ends its movement when they are that old;
+    /// for holders who may be silent for longer than 150 ms, later by the difference.
     pub max_age: Seconds,
     /// How long the last speed is held when a movement is over and no next one came, 0 to 0.1 s (0 brakes at once).
     /// It rides out the jitter of a commander whose movements last exactly one period.

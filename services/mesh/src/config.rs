@@ -13,10 +13,11 @@ use zenoh::Config;
 /// Link settings that clients and routers share, as JSON5 values by their configuration key.
 ///
 /// The receiver of a lease is the other side, hence the same on both. `max_message_size` is above the largest message
-/// of Axle, so that an oversized one arrives and is refused by name, and below what would hurt. An express message takes
-/// a place of the queue alone; with the usual two places a link whose sender waits for a processor for a few
-/// milliseconds drops measurements, which a recording then lacks. Of `buffer_size` a link has four buffers to receive into;
-/// with the usual one it makes, and clears, a new buffer of 64 KiB for every message that comes while one is still held.
+/// of Axle, so that an oversized one arrives and is refused by name, and below what would hurt. With the usual two places
+/// of a queue a link whose sender waits for a processor for a few milliseconds drops measurements, which a recording then
+/// lacks. What waits is written together, and with a `time_limit` of 0 never waits for more of it. Of `buffer_size` a link
+/// has four buffers to receive into; with the usual one it makes, and clears, a new buffer of 64 KiB for every message that
+/// comes while one is still held.
 pub const LINK: &[(&str, &str)] = &[
     ("scouting/multicast/enabled", "false"),
     ("scouting/gossip/enabled", "false"),
