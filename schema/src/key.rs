@@ -199,8 +199,8 @@ pub struct Entry {
     json: ToJson,
 }
 
-/// Decodes a payload and shows it as JSON.
-type ToJson = fn(&[u8]) -> Result<serde_json::Value, Refusal>;
+/// Decodes a payload and writes it as JSON.
+type ToJson = fn(&[u8]) -> Result<String, Refusal>;
 
 impl Entry {
     /// The schema of what is published or asked, for example `axle.Dwm.v1`.
@@ -215,8 +215,8 @@ impl Entry {
     }
 }
 
-fn json<M: Message>(bytes: &[u8]) -> Result<serde_json::Value, Refusal> {
-    serde_json::to_value(decode::<M>(bytes)?).map_err(Refusal::internal)
+fn json<M: Message>(bytes: &[u8]) -> Result<String, Refusal> {
+    serde_json::to_string(&decode::<M>(bytes)?).map_err(Refusal::internal)
 }
 
 /// Wheel distances, measured by the board or the emulator.
@@ -448,11 +448,11 @@ pub fn knows(schema: &str) -> bool {
     READERS.contains_key(schema)
 }
 
-/// Decodes a sample into JSON by the schema that its encoding names, or else by its key.
+/// Decodes a sample and writes it as JSON, by the schema that its encoding names, or else by its key.
 ///
 /// # Errors
 /// [`Refusal::Unknown`] when neither is known, and what [`decode`] refuses.
-pub fn to_json(key: &str, encoding: &str, bytes: &[u8]) -> Result<serde_json::Value, Refusal> {
+pub fn to_json(key: &str, encoding: &str, bytes: &[u8]) -> Result<String, Refusal> {
     let named = encoding.split_once(';').map(|(_, schema)| schema).filter(|schema| !schema.is_empty());
     let reader = match named {
         Some(schema) => READERS.get(schema).copied(),

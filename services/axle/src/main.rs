@@ -25,22 +25,19 @@ mod run;
 mod settings;
 mod signal;
 mod supervisor;
+mod threads;
 mod topology;
 mod unread;
 mod why;
 
 use clap::Parser as _;
 use std::process::ExitCode;
-use thread_priority::{
-    NormalThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy, set_thread_priority_and_policy,
-    thread_native_id,
-};
 
 fn main() -> ExitCode {
     let cli = cli::Cli::parse();
     log::start(&cli.settings.log, cli.settings.log_format);
     if cli.command.looks_on() {
-        give_way();
+        threads::give_way();
     }
     // Zenoh needs a runtime of several threads; two are enough for a service.
     let runtime = match tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build() {
@@ -54,17 +51,5 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(fault) => out::fail(&fault),
-    }
-}
-
-/// Leaves the processor to whoever drives: who only looks on takes what nobody else wants, and stands back at once when
-/// somebody does. A lower priority alone would let each of fifty taps finish its slice before a command is passed on.
-///
-/// All threads that are started later inherit it, so it comes before them.
-fn give_way() {
-    let idle = ThreadSchedulePolicy::Normal(NormalThreadSchedulePolicy::Idle);
-    // A system that refuses takes nothing but this courtesy.
-    if let Err(fault) = set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Min, idle) {
-        tracing::debug!("cannot leave the processor to others: {fault}");
     }
 }

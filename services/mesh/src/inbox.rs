@@ -37,8 +37,7 @@ pub struct Raw {
 }
 
 impl Raw {
-    fn of(arrived: &Arrived) -> Self {
-        let Arrived { sample, at } = arrived;
+    fn of(Stamped { sample, at }: &Stamped) -> Self {
         Self {
             key: sample.key_expr().as_str().to_owned(),
             encoding: sample.encoding().to_string(),
@@ -58,47 +57,70 @@ impl Raw {
 /// The most bytes of payload that wait in one queue, whatever its capacity in samples.
 const MAX_WAITING: usize = 32 * 1024 * 1024;
 
+/// What waits in a queue.
+trait Arrived {
+    /// The bytes of its payload.
+    fn size(&self) -> usize;
+}
+
+/// A sample, and when it came.
+struct Stamped {
+    sample: Sample,
+    at: u64,
+}
+
+impl Stamped {
+    fn now(sample: Sample) -> Self {
+        Self { sample, at: crate::clock::wall_nanoseconds() }
+    }
+}
+
+impl Arrived for Stamped {
+    fn size(&self) -> usize {
+        self.sample.payload().len()
+    }
+}
+
+impl Arrived for Raw {
+    fn size(&self) -> usize {
+        self.payload.len()
+    }
+}
+
 /// A queue between a callback and a beat, bounded in samples and in bytes.
-struct Cell {
-    queue: Mutex<Queue>,
+struct Cell<A> {
+    queue: Mutex<Queue<A>>,
     capacity: usize,
     arrived: Notify,
     alarm: OnceLock<Alarm>,
     dropped: AtomicU64,
 }
 
-/// A sample, and when it came.
-struct Arrived {
-    sample: Sample,
-    at: u64,
-}
-
-#[derive(Default)]
-struct Queue {
-    samples: VecDeque<Arrived>,
+struct Queue<A> {
+    samples: VecDeque<A>,
     bytes: usize,
 }
 
-impl Queue {
-    fn pop(&mut self) -> Option<Arrived> {
+impl<A: Arrived> Queue<A> {
+    fn pop(&mut self) -> Option<A> {
         let arrived = self.samples.pop_front()?;
-        self.bytes -= arrived.sample.payload().len();
+        self.bytes -= arrived.size();
         Some(arrived)
     }
 }
 
-impl Cell {
+impl<A: Arrived> Cell<A> {
     fn new(capacity: usize) -> Arc<Self> {
         Arc::new(Self {
-            queue: Mutex::default(),
+            queue: Mutex::new(Queue { samples: VecDeque::new(), bytes: 0 }),
             capacity,
             arrived: Notify::new(),
             alarm: OnceLock::new(),
             dropped: AtomicU64::new(0),
         })
     }
-    fn store(&self, sample: Sample) {
-        let size = sample.payload().len();
+    fn store(&self, arrived: A) {
+        let size = arrived.size();
         let mut queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
         while queue.samples.len() >= self.capacity || queue.bytes + size > MAX_WAITING {
             self.dropped.fetch_add(1, Relaxed);
@@ -107,7 +129,7 @@ impl Cell {
             }
         }
         queue.bytes += size;
-        queue.samples.push_back(Arrived { sample, at: crate::clock::wall_nanoseconds() });
+        queue.samples.push_back(arrived);
         drop(queue);
         self.arrived.notify_one();
         self.ring();
@@ -117,17 +139,17 @@ impl Cell {
             alarm.ring();
         }
     }
-    fn oldest(&self) -> Option<Arrived> {
+    fn oldest(&self) -> Option<A> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner).pop()
     }
-    fn newest(&self) -> Option<Arrived> {
+    fn newest(&self) -> Option<A> {
         let mut queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
         let newest = queue.samples.pop_back();
         queue.samples.clear();
         queue.bytes = 0;
         newest
     }
-    async fn next(&self) -> Arrived {
+    async fn next(&self) -> A {
         loop {
             if let Some(sample) = self.oldest() {
                 return sample;
@@ -148,7 +170,7 @@ pub struct Heard<M> {
 
 /// Samples of one key, waiting to be taken.
 pub struct Inbox<M> {
-    cell: Arc<Cell>,
+    cell: Arc<Cell<Stamped>>,
     oversized: Arc<AtomicU64>,
     counters: Arc<Counters>,
     count: Arc<Count>,
@@ -161,7 +183,7 @@ pub struct Inbox<M> {
 /// Raw samples of a key expression, waiting to be taken: for taps and recorders.
 pub struct Tap {
     expression: zenoh::key_expr::KeyExpr<'static>,
-    cell: Arc<Cell>,
+    cell: Arc<Cell<Raw>>,
     counters: Arc<Counters>,
     _subscriber: zenoh::pubsub::Subscriber<()>,
 }
@@ -190,7 +212,7 @@ impl Mesh {
                     count_oversized.fetch_add(1, Relaxed);
                     store.ring();
                 } else {
-                    store.store(sample);
+                    store.store(Stamped::now(sample));
                 }
             })
             .wait()
@@ -220,7 +242,8 @@ impl Mesh {
         let subscriber = self
             .session
             .declare_subscriber(expression.clone())
-            .callback(move |sample| store.store(sample))
+            // A copy: a sample holds the whole buffer that it was received in, however small it is itself.
+            .callback(move |sample| store.store(Raw::of(&Stamped::now(sample))))
             .wait()
             .map_err(|source| Fault::Declare { key, source })?;
         Ok(Tap { expression, cell, counters: Arc::clone(&self.counters), _subscriber: subscriber })
@@ -269,8 +292,7 @@ impl<M: Message> Inbox<M> {
         self.oversized.load(Relaxed)
     }
 
-    fn read(&self, arrived: &Arrived) -> Option<Heard<M>> {
-        let sample = &arrived.sample;
+    fn read(&self, Stamped { sample, .. }: &Stamped) -> Option<Heard<M>> {
         self.counters.received.fetch_add(1, Relaxed);
         match decode_as(&sample.encoding().to_string(), &sample.payload().to_bytes()) {
             Ok(message) => {
@@ -295,15 +317,15 @@ impl Tap {
     }
     /// The oldest sample, as soon as there is one.
     pub async fn next(&self) -> Raw {
-        let sample = self.cell.next().await;
+        let raw = self.cell.next().await;
         self.counters.received.fetch_add(1, Relaxed);
-        Raw::of(&sample)
+        raw
     }
     /// The oldest sample that waits, if any.
     pub fn take(&self) -> Option<Raw> {
-        let sample = self.cell.oldest()?;
+        let raw = self.cell.oldest()?;
         self.counters.received.fetch_add(1, Relaxed);
-        Some(Raw::of(&sample))
+        Some(raw)
     }
     /// Samples that were forgotten because nobody took them in time.
     pub fn dropped(&self) -> u64 {

@@ -15,20 +15,23 @@ use axle_schema::{RobotId, Seconds};
 use field::{Condition, Course, Path};
 use report::Report;
 use since::Past;
+use std::borrow::Borrow;
 use std::collections::BTreeSet;
 use std::time::Duration;
-use tokio::time::{Instant, sleep_until};
+use tokio::time::{Instant, sleep, sleep_until};
 
 /// Messages that may wait for a slow terminal; older ones are dropped and counted.
 const WAITING: usize = 4096;
+/// What has come is looked at so often, as screens show pictures: a process that wakes for every message costs the
+/// processor more than the messages do.
+const GLANCE: Duration = Duration::from_millis(20);
 /// A tap that hears nothing for so long says so.
 const SILENCE: Duration = Duration::from_secs(2);
 /// Processes have so long to say which robots there are.
 const PATIENCE: Duration = Duration::from_millis(700);
 
 pub(super) async fn tap(settings: &Settings, args: &Tap) -> anyhow::Result<()> {
-    let condition = args.condition.as_deref().map(Condition::parse).transpose().map_err(usage)?;
-    let mut course = args.field.as_deref().map(Path::parse).transpose().map_err(usage)?.map(Course::of);
+    let mut show = Show::of(args)?;
     let mesh = settings.join("tap").await?;
     let tap = mesh.tap(&args.keys, WAITING).map_err(|fault| match fault {
         Fault::KeyExpression(_) => usage(fault),
@@ -41,38 +44,22 @@ pub(super) async fn tap(settings: &Settings, args: &Tap) -> anyhow::Result<()> {
         }
         None => Past::default(),
     };
-    let (mut heard, mut dropped) = (0_u64, 0);
+    let mut dropped = 0;
     let end = args.time.map(|time| Instant::now() + Duration::from_secs_f64(time));
     let mut silent_at = Some(Instant::now() + SILENCE);
-    let mut report = Report::new(args);
-    let mut say = |raw: &Raw, report: &mut Report| -> anyhow::Result<u64> {
-        if condition.as_ref().is_some_and(|condition| !holds(condition, raw)) {
-            return Ok(0);
-        }
-        match (&mut course, report.is_on()) {
-            (Some(course), _) => course.say(raw, args.json)?,
-            (None, true) => report.count(raw),
-            (None, false) => data(&line::line(raw, args.json)?)?,
-        }
-        Ok(1)
-    };
-    let is_enough = |heard: u64| args.count.is_some_and(|count| heard >= count);
-    for raw in &past.samples {
-        heard += say(raw, &mut report)?;
-        if is_enough(heard) {
-            mesh.leave().await;
-            return Ok(());
-        }
-    }
-    loop {
+    show.all(past.samples.iter())?;
+    while !show.is_full() {
         tokio::select! {
             raw = tap.next() => {
                 silent_at = None;
-                if !past.has(&raw) {
-                    heard += say(&raw, &mut report)?;
+                // Who is flooded looks up too, for the signal to stop.
+                let waiting = std::iter::once(raw).chain(std::iter::from_fn(|| tap.take())).take(WAITING);
+                show.all(waiting.filter(|raw| !past.has(raw)))?;
+                if !show.is_full() {
+                    sleep(GLANCE).await;
                 }
             }
-            () = report.due() => report.print()?,
+            () = show.report.due() => show.report.print()?,
             () = at(silent_at) => {
                 silent_at = None;
                 let near = near::names(&mesh, &args.keys).await.unwrap_or_default();
@@ -81,19 +68,66 @@ pub(super) async fn tap(settings: &Settings, args: &Tap) -> anyhow::Result<()> {
             () = at(end) => break,
             () = stop.wait() => break,
         }
-        if tap.dropped() > dropped && !report.is_on() {
+        if tap.dropped() > dropped && !show.report.is_on() {
             dropped = tap.dropped();
             note(&format!("{dropped} messages were dropped: the terminal is slower than the streams"));
         }
-        if is_enough(heard) {
-            break;
-        }
     }
-    if report.is_on() {
-        report.print()?;
+    if show.report.is_on() {
+        show.report.print()?;
     }
     mesh.leave().await;
     Ok(())
+}
+
+/// What is shown of what is heard.
+struct Show {
+    condition: Option<Condition>,
+    course: Option<Course>,
+    report: Report,
+    json: bool,
+    /// How many messages are shown at most.
+    most: Option<u64>,
+    shown: u64,
+}
+
+impl Show {
+    fn of(args: &Tap) -> anyhow::Result<Self> {
+        Ok(Self {
+            condition: args.condition.as_deref().map(Condition::parse).transpose().map_err(usage)?,
+            course: args.field.as_deref().map(Path::parse).transpose().map_err(usage)?.map(Course::of),
+            report: Report::new(args),
+            json: args.json,
+            most: args.count,
+            shown: 0,
+        })
+    }
+    fn is_full(&self) -> bool {
+        self.most.is_some_and(|most| self.shown >= most)
+    }
+    /// Shows these until it is full; all lines are written in one go.
+    fn all(&mut self, samples: impl Iterator<Item = impl Borrow<Raw>>) -> anyhow::Result<()> {
+        let mut lines = Vec::new();
+        for raw in samples {
+            if self.is_full() {
+                break;
+            }
+            let raw = raw.borrow();
+            if self.condition.as_ref().is_some_and(|condition| !holds(condition, raw)) {
+                continue;
+            }
+            self.shown += 1;
+            match (&mut self.course, self.report.is_on()) {
+                (Some(course), _) => lines.push(course.line(raw, self.json)),
+                (None, true) => self.report.count(raw),
+                (None, false) => lines.push(line::line(raw, self.json)?),
+            }
+        }
+        if !lines.is_empty() {
+            data(&lines.join("\n"))?;
+        }
+        Ok(())
+    }
 }
 
 /// The robots that a key expression may be about, of those that have a Source.

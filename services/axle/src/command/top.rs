@@ -81,11 +81,14 @@ async fn watch(mesh: &Mesh, tap: &Tap, mut board: Board) -> anyhow::Result<()> {
     let mut due = Instant::now();
     loop {
         tokio::select! {
-            raw = tap.next() => board.count(&raw),
-            Some(everybody) = comings.recv() => board.hear(everybody, Instant::now()),
+            Some(everybody) = comings.recv() => {
+                count(tap, &mut board);
+                board.hear(everybody, Instant::now());
+            }
             Some(word) = words.recv() => board.say(word),
             () = sleep_until(due) => {
                 due = Instant::now() + DRAW;
+                count(tap, &mut board);
                 screen.draw(&board.lines())?;
             }
             Some(action) = keys.recv() => match action {
@@ -103,6 +106,13 @@ async fn watch(mesh: &Mesh, tap: &Tap, mut board: Board) -> anyhow::Result<()> {
     }
     asking.abort();
     Ok(())
+}
+
+/// Counts what has come. Whoever wakes for every message costs the processor more than the messages do.
+fn count(tap: &Tap, board: &mut Board) {
+    for raw in std::iter::from_fn(|| tap.take()).take(WAITING) {
+        board.count(&raw);
+    }
 }
 
 /// Asks everybody again and again, beside the screen.

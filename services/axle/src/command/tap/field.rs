@@ -1,7 +1,6 @@
 //! One field of a message, its course, and conditions on fields.
 
 use super::line::{brief, read};
-use crate::out::data;
 use axle_mesh::Raw;
 use serde_json::Value;
 use std::collections::{BTreeMap, VecDeque};
@@ -133,15 +132,15 @@ impl Course {
     pub(super) const fn of(path: Path) -> Self {
         Self { path, streams: BTreeMap::new() }
     }
-    pub(super) fn say(&mut self, raw: &Raw, json: bool) -> anyhow::Result<()> {
+    pub(super) fn line(&mut self, raw: &Raw, json: bool) -> String {
         let value = read(raw).ok();
         let found = value.as_ref().and_then(|value| self.path.of(value));
         if json {
-            let line = serde_json::json!({ "key": raw.key, "field": self.path.text, "value": found });
-            return Ok(data(&line.to_string())?);
+            return serde_json::json!({ "key": raw.key, "field": self.path.text, "value": found })
+                .to_string();
         }
         let Some(found) = found else {
-            return Ok(data(&format!("{} has no {}", raw.key, self.path.text))?);
+            return format!("{} has no {}", raw.key, self.path.text);
         };
         let mut spark = String::new();
         if let Some(number) = found.as_f64()
@@ -154,7 +153,8 @@ impl Course {
             }
             spark = sparkline(course);
         }
-        Ok(data(format!("{} {} {:>10} {spark}", raw.key, self.path.text, brief(found)).trim_end())?)
+        let line = format!("{} {} {:>10} {spark}", raw.key, self.path.text, brief(found));
+        line.trim_end().to_owned()
     }
 }
 

@@ -3,6 +3,7 @@
 //! Source answers for encoders, inertia, fixes and ranges. What it gave is said in the order of the stamps, and then what is
 //! heard now; a sample that is in both is said once.
 
+use super::line::read;
 use crate::out::note;
 use axle_mesh::{Mesh, Raw, Retry, Tap};
 use axle_schema::codec::encoding_of;
@@ -53,8 +54,7 @@ impl Past {
     /// Whether this sample was among them.
     pub(super) fn has(&self, raw: &Raw) -> bool {
         let Some(newest) = self.newest.get(&raw.key) else { return false };
-        let value = key::to_json(&raw.key, &raw.encoding, &raw.payload);
-        value.is_ok_and(|value| value["stamp"].as_f64().is_some_and(|stamp| stamp <= *newest))
+        read(raw).is_ok_and(|value| value["stamp"].as_f64().is_some_and(|stamp| stamp <= *newest))
     }
 }
 

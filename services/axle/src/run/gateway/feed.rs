@@ -116,7 +116,7 @@ impl Feed {
         for raw in newest.into_values() {
             let Some((robot, stream)) = place(&raw.key) else { continue };
             match key::to_json(&raw.key, &raw.encoding, &raw.payload) {
-                Ok(value) => put(&self.hall, &robot, &stream, &value),
+                Ok(json) => show(&self.hall, &robot, &stream, json.into()),
                 Err(refusal) => refuse(&self.hall, &raw, &refusal),
             }
         }
@@ -138,10 +138,14 @@ fn word<T: Serialize>(value: &T) -> Option<Word> {
 }
 
 fn put<T: Serialize>(hall: &Hall, robot: &RobotId, stream: &str, value: &T) {
-    let place = Place { robot: robot.to_string(), stream: stream.to_owned() };
     if let Some(word) = word(value) {
-        hall.board().put(hall.now(), place, word);
+        show(hall, robot, stream, word);
     }
+}
+
+fn show(hall: &Hall, robot: &RobotId, stream: &str, word: Word) {
+    let place = Place { robot: robot.to_string(), stream: stream.to_owned() };
+    hall.board().put(hall.now(), place, word);
 }
 
 fn add<T: Serialize>(hall: &Hall, robot: &str, stream: &str, value: &T) {

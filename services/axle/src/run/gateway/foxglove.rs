@@ -66,9 +66,9 @@ impl Show {
         let schema = || serde_json::json!({ "type": "object", "title": name }).to_string();
         // Decoding it is for whoever watches.
         if shelf.open(&raw.key, name, schema)
-            && let Ok(value) = key::to_json(&raw.key, &raw.encoding, &raw.payload)
+            && let Ok(json) = key::to_json(&raw.key, &raw.encoding, &raw.payload)
         {
-            shelf.put(&raw.key, raw.received, value.to_string().into());
+            shelf.put(&raw.key, raw.received, json.into());
         }
     }
 }
