@@ -17,7 +17,9 @@ use axle_router::{Router, RouterSettings};
 use axle_schema::key::Presence;
 use std::collections::BTreeMap;
 use std::net::TcpListener;
+use std::num::NonZero;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU16, AtomicU32, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 use tokio::sync::{Semaphore, SemaphorePermit};
@@ -85,8 +87,10 @@ impl Drop for Scratch {
     }
 }
 
-/// So many worlds of processes at a time: beyond that, tests would measure the machine and not Axle.
-static TURNS: Semaphore = Semaphore::const_new(2);
+/// Two worlds of processes at a time for each core, since they wait for robots half of their time: beyond that, tests would
+/// measure the machine and not Axle.
+static TURNS: LazyLock<Semaphore> =
+    LazyLock::new(|| Semaphore::new(2 * std::thread::available_parallelism().map_or(1, NonZero::get)));
 
 /// A place for processes: a directory, an endpoint, and nothing else yet.
 pub(crate) struct World {

@@ -6,13 +6,14 @@ use crate::out::usage;
 use crate::settings::Settings;
 use crate::threads::Threads;
 use anyhow::Context as _;
-use axle_router::{Router as Process, RouterFault, RouterSettings};
+use axle_router::{DEFAULT_ENDPOINT, Router as Process, RouterFault, RouterSettings};
 
 pub(super) async fn router(settings: &Settings, args: Router) -> anyhow::Result<()> {
     Threads::Router.give().context("begin anew with more threads")?;
     let mut stop = crate::signal::stop()?;
     let link = settings.link()?;
     let access = link.identity.as_ref().map(|identity| rules(&args, identity)).transpose()?;
+    let connects = settings.connect != [DEFAULT_ENDPOINT];
     let own = |endpoints: &[String]| endpoints.iter().map(|endpoint| settings.endpoint(endpoint)).collect();
     let settings = RouterSettings {
         listen: own(&args.listen),
@@ -21,6 +22,11 @@ pub(super) async fn router(settings: &Settings, args: Router) -> anyhow::Result<
         link,
         access,
     };
+    if connects {
+        tracing::warn!(
+            "--connect (AXLE_CONNECT) is for services: a router links to other routers with --link"
+        );
+    }
     if settings.insecure_lan && settings.link.identity.is_none() {
         tracing::warn!(
             "listening without encryption or authentication: whoever reaches this port can drive the robots"

@@ -12,6 +12,8 @@ use std::time::Duration;
 
 /// How often each computer is asked.
 const ROUNDS: usize = 8;
+/// So many rounds may go unanswered: one answer that a router lacks says nothing of a clock.
+const MISSED: usize = 2;
 
 /// How far a clock is ahead of the one of this computer.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,14 +44,19 @@ pub(super) async fn measure(
     let asked: BTreeMap<String, &Presence> =
         answering.map(|(presence, _)| (super::pairs::host_of(presence), presence)).collect();
     for (host, presence) in asked {
+        let mut missed = 0;
         for _ in 0..ROUNDS {
             let begun = clock::wall();
-            let Ok(seen) = mesh.processes_of(&presence.robot, &presence.service, patience).await else {
-                break;
-            };
+            let seen = mesh.processes_of(&presence.robot, &presence.service, patience).await;
             let ended = clock::wall();
-            let own = seen.into_iter().find(|(other, _)| other.boot == presence.boot);
-            let Some(wall) = own.and_then(|(_, status)| status?.wall) else { break };
+            let own = seen.unwrap_or_default().into_iter().find(|(other, _)| other.boot == presence.boot);
+            let Some(wall) = own.and_then(|(_, status)| status?.wall) else {
+                missed += 1;
+                if missed > MISSED {
+                    break;
+                }
+                continue;
+            };
             let round = Offset::of_round(begun, wall.0, ended);
             let best = offsets.entry(host.clone()).or_insert(round);
             if round.uncertainty < best.uncertainty {

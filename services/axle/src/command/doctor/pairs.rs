@@ -180,8 +180,9 @@ async fn look(
     }
     tokio::time::sleep(LOOKING).await;
     for view in views.values_mut() {
-        view.offsets = clocks::measure(&view.mesh, &view.first, PATIENCE).await;
         view.second = look_again(&view.mesh, &view.first).await?;
+        // By those of the second look: the first answer of a router that one has just joined may lack everybody.
+        view.offsets = clocks::measure(&view.mesh, &view.second, PATIENCE).await;
     }
     findings.extend(of_clocks(&views));
     Ok((views, findings))
