@@ -341,6 +341,54 @@ fn coarse_ticks_are_no_slip() {
     }
 }
 
+/// The encoders as they are read in whole ticks.
+fn ticked(measurement: Measurement, tick: f64) -> Measurement {
+    let cut = |way: Metres| Metres((way.0 / tick).floor() * tick);
+    match measurement {
+        Measurement::Encoders(data) => {
+            Measurement::Encoders(EncodersData { left: cut(data.left), right: cut(data.right), ..data })
+        }
+        other => other,
+    }
+}
+
+#[test]
+fn a_robot_that_begins_to_move_within_a_tick_does_not_slip() {
+    let felt = EkfParams { accelerometer_noise: 0.01, ..EkfParams::default() };
+    for (seed, ekf) in (1..200).flat_map(|seed| [(seed, EkfParams::default()), (seed, felt)]) {
+        // Wheels that stand do not tick, and of those that move only the ticks shall be noise.
+        let ekf = EkfParams { wheel_noise: 1e-6, ..ekf };
+        let quiet = NavigatorParams { k: Metres(1e-7), ekf, ..params() };
+        let tick = quiet.tick.0;
+        let (mut robot, mut navigator) = begin(seed, &quiet);
+        drive(&mut robot, &mut navigator, 500, false, |measurement| Some(ticked(measurement, tick)));
+        let mut step = |left: f64, right: f64| {
+            for measurement in robot.drive(left, right).into_iter().rev() {
+                let _ = navigator.measure(&ticked(measurement, tick));
+            }
+            navigator.events()
+        };
+        for slower in (0..50).rev() {
+            let _ = step(0.4 * f64::from(slower) / 50.0, 0.4 * f64::from(slower) / 50.0);
+        }
+        for (acceleration, turns) in [1.5, 0.35, 0.11].into_iter().flat_map(|a| [(a, true), (a, false)]) {
+            let sign = if turns { -1.0 } else { 1.0 };
+            // It stands longer than what was driven before counts; then it gathers speed, and brakes as fast.
+            for _ in 0..100 {
+                let _ = step(0.0, 0.0);
+            }
+            for (at, now) in (0..10).chain((0..10).rev()).enumerate() {
+                let speed = acceleration * robot::DT * f64::from(now);
+                let events = step(sign * speed, speed);
+                // Later the ticks of both wheels, which turn alike here, are no longer by chance.
+                if at < 6 {
+                    assert_eq!(events, [], "seed {seed}, {acceleration} m/s², turns: {turns}, step {at}");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn dead_reckoning_is_watched_as_well_and_stops_where_it_is_told() {
     for (watch, method) in [(true, Method::Arc), (true, Method::Ticks), (false, Method::Arc)] {

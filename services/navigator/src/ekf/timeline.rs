@@ -6,7 +6,7 @@ mod absolute;
 mod poses;
 mod span;
 
-use super::filter::{Filter, Noise, TRACK};
+use super::filter::{Filter, Motion, Noise, TRACK};
 use super::watch::{Seen, Watch};
 use crate::measurement::Counts;
 use crate::params::NavigatorParams;
@@ -243,7 +243,9 @@ impl Timeline {
             if !node.looked && !node.anchor && (motion.gyro.is_some() || raw.is_some()) {
                 node.looked = true;
                 let is_whole = self.inertia.gyro.is_whole(from, node.reading.stamp.0);
-                let turn = node.odom.doubt_turn(&motion, &self.noise);
+                // A robot that stood begins to move within a tick, which its wheels do not show yet.
+                let begins = Motion { ticks: true, ..motion };
+                let turn = node.odom.doubt_turn(&begins, &self.noise);
                 let seen = Seen {
                     stamp: node.reading.stamp.0,
                     dt: motion.dt,
@@ -252,7 +254,7 @@ impl Timeline {
                     track,
                     gyro: gyro.filter(|_| is_whole),
                     turn: turn.filter(|_| is_whole),
-                    way: node.odom.doubt_way(&motion, &self.noise),
+                    way: node.odom.doubt_way(&begins, &self.noise),
                     change: motion.push.map(|push| push.change),
                 };
                 self.noticed.extend(watch.look(&seen, raw.filter(|_| is_whole), SLIP));
