@@ -3,7 +3,7 @@
 import json
 import sys
 
-# ms, there and back. The goal is 5 ms, and fifty taps on the two cores of those who drive were measured at 2.6 to 4.4 ms;
+# ms, there and back. The goal is 5 ms, and fifty taps on the two cores of those who drive were measured at 0 to 4.4 ms;
 # the bound leaves room for a machine that does other things too. Who waited for a stuck tap would wait for seconds.
 APART = 50.0
 
