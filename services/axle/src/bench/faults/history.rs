@@ -90,14 +90,19 @@ fn holders(events: &[Event], violations: &mut Vec<String>) {
 struct Said {
     command: Command,
     meta: Meta,
+    at: f64,
 }
+
+/// A robot that gives no reading for so long, in s, is frozen or cut off: its beat and its readings take a third of that.
+const STILL: f64 = 0.06;
 
 /// Every command that the wheels obeyed was young enough, of the newest grant, and newer than the one before.
 fn obedience(events: &[Event], verdict: &mut Verdict) {
     let mut said: BTreeMap<(Boot, u64), Said> = BTreeMap::new();
     for event in events {
         if let What::Command { command, meta: Some(meta) } = &event.what {
-            let first = said.insert((meta.source, meta.seq), Said { command: *command, meta: *meta });
+            let first =
+                said.insert((meta.source, meta.seq), Said { command: *command, meta: *meta, at: event.at });
             if first.is_none() {
                 verdict.delays.push((event.at - meta.stamp) * 1e3);
             }
@@ -105,14 +110,15 @@ fn obedience(events: &[Event], verdict: &mut Verdict) {
     }
     let mut last: Option<(Cause, &Said)> = None;
     let mut drivers: BTreeMap<(Boot, u32), Boot> = BTreeMap::new();
-    let mut heard: Option<(Boot, u64)> = None;
+    let mut heard: Option<(Boot, u64, f64, f64)> = None;
     for event in events {
         let What::Reading { data, meta: Some(Meta { seq: number, source, cause, .. }) } = &event.what else {
             continue;
         };
         // Whoever listens may be cut off too. Since when the wheels had obeyed a command by then, nobody can tell.
-        let missed = heard.is_some_and(|(boot, before)| boot == *source && *number > before + 1);
-        heard = Some((*source, *number));
+        let before = heard.filter(|(boot, ..)| boot == source);
+        let missed = before.is_some_and(|(_, before, ..)| *number > before + 1);
+        heard = Some((*source, *number, event.at, data.stamp.0));
         let Some(cause) = cause else { continue };
         if last.is_some_and(|(before, _)| before == *cause) {
             continue;
@@ -121,13 +127,18 @@ fn obedience(events: &[Event], verdict: &mut Verdict) {
         let Some(now) = said.get(&(cause.source, cause.seq)) else { continue };
         let Command { boot, epoch, seq, echo, .. } = now.command;
         let age = f64::from(Tick::of(data.stamp).since(echo));
-        if !missed {
+        // A robot may have obeyed in time, and been frozen before it gave a reading: so may one have that got the command
+        // hardly later than it gave the last one. Whatever came later found it frozen, and was obeyed when it thawed.
+        let froze =
+            before.is_some_and(|(_, _, at, stamp)| data.stamp.0 - stamp > STILL && now.at < at + STILL);
+        let is_known = !missed && !froze;
+        if is_known {
             verdict.ages.push(age);
         }
         let mut wrong = |why: String| {
             verdict.violations.push(format!("command {seq} of grant {epoch} was obeyed: {why}"))
         };
-        if age > OLDEST && !missed {
+        if age > OLDEST && is_known {
             wrong(format!("it was {age:.0} ms old"));
         }
         if boot != *source {

@@ -110,6 +110,22 @@ fn how_old_a_command_was_is_not_known_where_readings_are_missing() {
 }
 
 #[test]
+fn a_frozen_robot_may_have_obeyed_before_it_froze_but_not_what_came_later() {
+    let thawed = |said: f64| {
+        let mut events = good();
+        // The last reading, then a command, and a reading when it has thawed.
+        events.push(event(0.4, reading(DRIVER, 1, 0.4)));
+        events.push(event(0.4 + said, command(DRIVER, 2, (1, 3), 0.39)));
+        events.push(event(2.5, reading(DRIVER, 2, 2.5)));
+        judge(&events)
+    };
+    let before = thawed(0.02);
+    assert_eq!((before.violations.len(), before.ages.len()), (0, 2), "{:?}", before.violations);
+    let after = thawed(0.2);
+    assert!(after.violations.len() == 1 && after.violations[0].contains("ms old"), "{:?}", after.violations);
+}
+
+#[test]
 fn every_law_is_broken_by_its_own_history_and_by_nothing_else() {
     let broken = |what: Vec<What>, words: &str| {
         let mut events = good();
