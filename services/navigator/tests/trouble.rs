@@ -326,17 +326,7 @@ fn coarse_ticks_are_no_slip() {
     for seed in 1..20 {
         let coarse = NavigatorParams { tick: Metres(0.013), ..params() };
         let (mut robot, mut navigator) = begin(seed, &coarse);
-        drive(&mut robot, &mut navigator, 3000, true, |measurement| match measurement {
-            Measurement::Encoders(data) => {
-                let cut = |way: Metres| Metres((way.0 / 0.013).floor() * 0.013);
-                Some(Measurement::Encoders(EncodersData {
-                    left: cut(data.left),
-                    right: cut(data.right),
-                    ..data
-                }))
-            }
-            other => Some(other),
-        });
+        drive(&mut robot, &mut navigator, 3000, true, |measurement| Some(ticked(measurement, 0.013)));
         assert_eq!(navigator.events(), [], "seed {seed}");
     }
 }
