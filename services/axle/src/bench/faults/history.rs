@@ -93,6 +93,15 @@ struct Said {
     at: f64,
 }
 
+/// When a reading was given, by the clock of the bench and by the robot's, in s.
+#[derive(Clone, Copy)]
+struct Reading {
+    source: Boot,
+    number: u64,
+    at: f64,
+    stamp: f64,
+}
+
 /// A robot that gives no reading for so long, in s, is frozen or cut off: its beat and its readings take a third of that.
 const STILL: f64 = 0.06;
 
@@ -101,24 +110,24 @@ fn obedience(events: &[Event], verdict: &mut Verdict) {
     let mut said: BTreeMap<(Boot, u64), Said> = BTreeMap::new();
     for event in events {
         if let What::Command { command, meta: Some(meta) } = &event.what {
-            let first =
-                said.insert((meta.source, meta.seq), Said { command: *command, meta: *meta, at: event.at });
-            if first.is_none() {
+            // One that is said again was known before.
+            said.entry((meta.source, meta.seq)).or_insert_with(|| {
                 verdict.delays.push((event.at - meta.stamp) * 1e3);
-            }
+                Said { command: *command, meta: *meta, at: event.at }
+            });
         }
     }
     let mut last: Option<(Cause, &Said)> = None;
     let mut drivers: BTreeMap<(Boot, u32), Boot> = BTreeMap::new();
-    let mut heard: Option<(Boot, u64, f64, f64)> = None;
+    let mut last_reading: Option<Reading> = None;
     for event in events {
         let What::Reading { data, meta: Some(Meta { seq: number, source, cause, .. }) } = &event.what else {
             continue;
         };
         // Whoever listens may be cut off too. Since when the wheels had obeyed a command by then, nobody can tell.
-        let before = heard.filter(|(boot, ..)| boot == source);
-        let missed = before.is_some_and(|(_, before, ..)| *number > before + 1);
-        heard = Some((*source, *number, event.at, data.stamp.0));
+        let reading = Reading { source: *source, number: *number, at: event.at, stamp: data.stamp.0 };
+        let before = last_reading.replace(reading).filter(|before| before.source == *source);
+        let missed = before.is_some_and(|before| *number > before.number + 1);
         let Some(cause) = cause else { continue };
         if last.is_some_and(|(before, _)| before == *cause) {
             continue;
@@ -130,7 +139,7 @@ fn obedience(events: &[Event], verdict: &mut Verdict) {
         // A robot may have obeyed in time, and been frozen before it gave a reading: so may one have that got the command
         // hardly later than it gave the last one. Whatever came later found it frozen, and was obeyed when it thawed.
         let froze =
-            before.is_some_and(|(_, _, at, stamp)| data.stamp.0 - stamp > STILL && now.at < at + STILL);
+            before.is_some_and(|before| data.stamp.0 - before.stamp > STILL && now.at < before.at + STILL);
         let is_known = !missed && !froze;
         if is_known {
             verdict.ages.push(age);
