@@ -65,7 +65,7 @@ pub enum Fault {
     },
     /// A key expression that Zenoh does not accept.
     #[error(
-        "{0:?} is not a key expression: no leading or trailing slash, no empty chunk; for example axle/r1/**"
+        "{0:?} is not a key expression: no leading or trailing slash, no empty chunk, no # or ?; for example axle/r1/**"
     )]
     KeyExpression(String),
 }
